@@ -1,0 +1,1 @@
+"""Compiler from probabilistic, three-valued planning domains to belief behavior trees."""

@@ -1,0 +1,1 @@
+"""From syntax to model, and the checks of a model."""

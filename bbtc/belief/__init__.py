@@ -1,0 +1,1 @@
+"""Exact semantics: beliefs, ticks, self-simulation."""

@@ -1,0 +1,123 @@
+"""Diagnostics: messages with a stable code, a place and a hint, collected and raised together."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from bbtc.codes import CODES
+from bbtc.source import Span
+
+
+class Severity(enum.Enum):
+    """How grave a diagnostic is; only errors stop a command."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Related:
+    """A second place that explains a diagnostic (the declaration it clashes with)."""
+
+    message: str
+    span: Span | None
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One message. ``code`` is a key of :data:`bbtc.codes.CODES`."""
+
+    code: str
+    message: str
+    span: Span | None = None
+    hint: str | None = None
+    severity: Severity = Severity.ERROR
+    related: tuple[Related, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.code not in CODES:
+            raise ValueError(f"undocumented diagnostic code {self.code}")
+
+    def render(self) -> str:
+        """The message as text: place, severity, code, excerpt with caret, hint."""
+        head = f"{self.severity.value}[{self.code}]: {self.message}"
+        lines = [f"{self.span.place}: {head}" if self.span else head]
+        if self.span:
+            lines.append(self.span.excerpt())
+        for related in self.related:
+            place = f"{related.span.place}: " if related.span else ""
+            lines.append(f"  note: {place}{related.message}")
+        if self.hint:
+            lines.append(f"  hint: {self.hint}")
+        return "\n".join(lines)
+
+
+@dataclass(slots=True)
+class Report:
+    """Collects the diagnostics of a run, in source order within a file."""
+
+    _recorded: dict[Diagnostic, None] = field(default_factory=dict)
+
+    def error(
+        self,
+        code: str,
+        message: str,
+        span: Span | None = None,
+        hint: str | None = None,
+        related: Iterable[Related] = (),
+    ) -> None:
+        """Record an error."""
+        self.add(Diagnostic(code, message, span, hint, Severity.ERROR, tuple(related)))
+
+    def warning(
+        self,
+        code: str,
+        message: str,
+        span: Span | None = None,
+        hint: str | None = None,
+        related: Iterable[Related] = (),
+    ) -> None:
+        """Record a warning."""
+        self.add(Diagnostic(code, message, span, hint, Severity.WARNING, tuple(related)))
+
+    def add(self, diagnostic: Diagnostic) -> None:
+        """Record a diagnostic unless the very same one stands already."""
+        self._recorded.setdefault(diagnostic)
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """The diagnostics that stop a command."""
+        return [d for d in self._recorded if d.severity is Severity.ERROR]
+
+    def __iter__(self) -> Iterator[Diagnostic]:
+        return iter(sorted(self._recorded, key=_place_key))
+
+    def raise_errors(self) -> None:
+        """Raise :class:`BbtcError` with everything recorded, if any of it is an error."""
+        if self.errors:
+            raise BbtcError(tuple(self))
+
+
+def _place_key(diagnostic: Diagnostic) -> tuple[str, int]:
+    span = diagnostic.span
+    return (span.source.name, span.start) if span else ("", -1)
+
+
+class BbtcError(Exception):
+    """The input cannot be processed; carries every diagnostic of the run (exit status 1)."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics = tuple(diagnostics)
+        super().__init__("\n".join(d.render() for d in self.diagnostics))
+
+    @classmethod
+    def single(cls, code: str, message: str, span: Span | None = None, hint: str | None = None) -> BbtcError:
+        """An error of one diagnostic."""
+        return cls([Diagnostic(code, message, span, hint)])
+
+
+class LimitReached(BbtcError):
+    """A limit (time, states, nodes, memory) stopped the work (exit status 3)."""

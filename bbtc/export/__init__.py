@@ -1,0 +1,1 @@
+"""Back-ends: from a tree to text."""

@@ -1,0 +1,1 @@
+"""Ground tasks and the stage that makes them."""

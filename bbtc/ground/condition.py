@@ -1,0 +1,180 @@
+"""Ground conditions: strong Kleene formulas over the variables of a task, by index."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.kleene import Truth, negate
+
+
+@dataclass(frozen=True, slots=True)
+class Is:
+    """The variable has the value. For true and false this is the Kleene literal (unknown while
+    the variable is unknown); for unknown it is the two-valued test ``(unknown p)``."""
+
+    variable: int
+    value: Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """The two-valued test ``(known p)``."""
+
+    variable: int
+
+
+@dataclass(frozen=True, slots=True)
+class And:
+    """Kleene conjunction: the minimum."""
+
+    parts: tuple[Condition, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Or:
+    """Kleene disjunction: the maximum."""
+
+    parts: tuple[Condition, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """Kleene negation."""
+
+    part: Condition
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """Always true or always false."""
+
+    value: bool
+
+
+Condition: TypeAlias = Is | Known | And | Or | Not | Constant
+TRUE = Constant(True)
+FALSE = Constant(False)
+
+
+def conjunction(parts: Iterable[Condition]) -> Condition:
+    """The conjunction, flattened, without repeats and constants."""
+    return _combine(And, TRUE, FALSE, parts)
+
+
+def disjunction(parts: Iterable[Condition]) -> Condition:
+    """The disjunction, flattened, without repeats and constants."""
+    return _combine(Or, FALSE, TRUE, parts)
+
+
+def _combine(
+    kind: type[And] | type[Or], neutral: Constant, absorbing: Constant, parts: Iterable[Condition]
+) -> Condition:
+    flat: dict[Condition, None] = {}
+    for part in parts:
+        if part == absorbing:
+            return absorbing
+        if isinstance(part, kind):
+            flat.update(dict.fromkeys(part.parts))
+        elif part != neutral:
+            flat[part] = None
+    if not flat:
+        return neutral
+    return next(iter(flat)) if len(flat) == 1 else kind(tuple(flat))
+
+
+def negation(part: Condition) -> Condition:
+    """The negation, pushed to the leaves (exact in strong Kleene logic: De Morgan holds)."""
+    match part:
+        case Is(variable, Truth.UNKNOWN):
+            return Known(variable)
+        case Is(variable, value):
+            return Is(variable, negate(value))
+        case Known(variable):
+            return Is(variable, Truth.UNKNOWN)
+        case And(parts):
+            return disjunction(map(negation, parts))
+        case Or(parts):
+            return conjunction(map(negation, parts))
+        case Not(inner):
+            return inner
+        case Constant(value):
+            return FALSE if value else TRUE
+        case _:
+            assert_never(part)
+
+
+def conjuncts(condition: Condition) -> tuple[Condition, ...]:
+    """The parts of a conjunction; a condition of another kind is its only part; true has none."""
+    if isinstance(condition, And):
+        return condition.parts
+    return () if condition == TRUE else (condition,)
+
+
+def variables(condition: Condition) -> Iterator[int]:
+    """Indices of the variables a condition reads, repeats included, from left to right."""
+    match condition:
+        case Is(variable) | Known(variable):
+            yield variable
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from variables(part)
+        case Not(part):
+            yield from variables(part)
+        case Constant():
+            return
+        case _:
+            assert_never(condition)
+
+
+def evaluate(condition: Condition, state: Sequence[int]) -> Truth:
+    """The Kleene value of a condition in a state (truth values by variable index)."""
+    match condition:
+        case Is(variable, Truth.TRUE):
+            return Truth(state[variable])
+        case Is(variable, Truth.FALSE):
+            return Truth(2 - state[variable])
+        case Is(variable, _):
+            return Truth.of(state[variable] == 1)
+        case Known(variable):
+            return Truth.of(state[variable] != 1)
+        case And(parts):
+            return min((evaluate(p, state) for p in parts), default=Truth.TRUE)
+        case Or(parts):
+            return max((evaluate(p, state) for p in parts), default=Truth.FALSE)
+        case Not(part):
+            return negate(evaluate(part, state))
+        case Constant(value):
+            return Truth.of(value)
+        case _:
+            assert_never(condition)
+
+
+def compile_condition(condition: Condition) -> Callable[[Sequence[int]], int]:
+    """:func:`evaluate` as a closure that returns plain ints, for states read very often."""
+    match condition:
+        case Is(variable, Truth.TRUE):
+            return lambda state: state[variable]
+        case Is(variable, Truth.FALSE):
+            return lambda state: 2 - state[variable]
+        case Is(variable, _):
+            return lambda state: 2 if state[variable] == 1 else 0
+        case Known(variable):
+            return lambda state: 0 if state[variable] == 1 else 2
+        case And(parts):
+            tests = [compile_condition(p) for p in parts]
+            return lambda state: min([test(state) for test in tests], default=2)
+        case Or(parts):
+            tests = [compile_condition(p) for p in parts]
+            return lambda state: max([test(state) for test in tests], default=0)
+        case Not(part):
+            test = compile_condition(part)
+            return lambda state: 2 - test(state)
+        case Constant(value):
+            constant = 2 if value else 0
+            return lambda _state: constant
+        case _:
+            assert_never(condition)

@@ -1,0 +1,33 @@
+"""Ground conditions in words: one wording for messages, labels and reasons."""
+
+from __future__ import annotations
+
+from typing_extensions import assert_never
+
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+
+
+def describe(task: Task, condition: Condition) -> str:
+    """``seen(soda)``, ``not seen(soda)``, ``unknown seen(soda)``, ``known seen(soda)``,
+    ``(a() and not b())``: the condition in words, on one line."""
+    match condition:
+        case Is(variable, Truth.TRUE):
+            return task.variables[variable].name
+        case Is(variable, Truth.FALSE):
+            return f"not {task.variables[variable].name}"
+        case Is(variable, _):
+            return f"unknown {task.variables[variable].name}"
+        case Known(variable):
+            return f"known {task.variables[variable].name}"
+        case And(parts):
+            return f"({' and '.join(describe(task, part) for part in parts)})"
+        case Or(parts):
+            return f"({' or '.join(describe(task, part) for part in parts)})"
+        case Not(part):
+            return f"not {describe(task, part)}"
+        case Constant(value):
+            return Truth.of(value).word
+        case _:
+            assert_never(condition)

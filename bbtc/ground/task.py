@@ -1,0 +1,194 @@
+"""The ground task: variables, initial belief, goal, actions and templates, all names resolved.
+
+Conditions and effects refer to variables by index into :attr:`Task.variables`. Probabilities
+and costs are exact rationals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+from bbtc.ground.condition import TRUE, Condition
+from bbtc.kleene import Truth
+from bbtc.source import Span
+
+
+def ground_name(symbol: str, args: tuple[str, ...]) -> str:
+    """``symbol(arg,…)``: the name of a ground predicate, action or template."""
+    return f"{symbol}({','.join(args)})"
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One ground predicate. ``three_valued`` if anything in the task can make it unknown."""
+
+    predicate: str
+    args: tuple[str, ...]
+    three_valued: bool
+    hidden: bool = False
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """``predicate(arg,…)``."""
+        return ground_name(self.predicate, self.args)
+
+    @property
+    def values(self) -> tuple[Truth, ...]:
+        """The values it can take."""
+        return (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN) if self.three_valued else (Truth.TRUE, Truth.FALSE)
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """Sets variables where ``when`` is true in the state before the action (None: always)."""
+
+    when: Condition | None
+    sets: tuple[tuple[int, Truth], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One thing that may happen, with its probability within its factor.
+
+    ``factors`` are further independent choices made if this outcome happens (chance nested in
+    a branch). ``reward`` is what the outcome adds to the reward fluent. ``costs`` are what it adds
+    to the action's cost.
+    """
+
+    probability: Fraction
+    effects: tuple[Effect, ...]
+    factors: tuple[Factor, ...] = ()
+    reward: Fraction = Fraction(0)
+    cost: Fraction = Fraction(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Factor:
+    """A distribution over outcomes; probabilities sum to 1. ``oneof`` marks a choice whose
+    probabilities are not known and count as equal."""
+
+    outcomes: tuple[Outcome, ...]
+    oneof: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class GroundAction:
+    """A schema with its arguments. One outcome of every factor happens, independently; all
+    conditions are read before any effect. Where effects of one occurrence set a variable to
+    different values, the Kleene maximum wins (delete before forget before add)."""
+
+    schema: str
+    args: tuple[str, ...]
+    precondition: Condition
+    factors: tuple[Factor, ...]
+    cost: Fraction = Fraction(1)
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """``schema(arg,…)``."""
+        return ground_name(self.schema, self.args)
+
+
+# --- templates -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class BodyControl:
+    """A control node of a template body."""
+
+    kind: Literal["sequence", "fallback", "skipper"]
+    children: tuple[Body, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BodyCondition:
+    """A condition of a template body."""
+
+    condition: Condition
+
+
+@dataclass(frozen=True, slots=True)
+class BodyAction:
+    """A call of a ground action, by name."""
+
+    action: str
+
+
+@dataclass(frozen=True, slots=True)
+class BodyTemplate:
+    """A call of another ground template, by name."""
+
+    template: str
+
+
+Body: TypeAlias = BodyControl | BodyCondition | BodyAction | BodyTemplate
+
+
+@dataclass(frozen=True, slots=True)
+class GroundTemplate:
+    """A named subtree with its arguments, and the guide (precondition, factors) that tells the
+    planner what it is for. Simulation runs the body only. ``factors`` is empty without a guide."""
+
+    template: str
+    args: tuple[str, ...]
+    precondition: Condition
+    factors: tuple[Factor, ...]
+    body: Body
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """``template(arg,…)``."""
+        return ground_name(self.template, self.args)
+
+
+# --- the task --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class InitialState:
+    """A possible initial state: one value for every variable."""
+
+    probability: Fraction
+    values: tuple[Truth, ...]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A ground planning task. Actions, templates and variables are sorted by name."""
+
+    domain: str
+    problem: str
+    variables: tuple[Variable, ...]
+    initial: tuple[InitialState, ...]
+    goal: Condition
+    actions: tuple[GroundAction, ...]
+    templates: tuple[GroundTemplate, ...] = ()
+    goal_probability: Fraction = Fraction(1)
+    goal_reward: Fraction = Fraction(0)
+    metric: Literal["cost", "reward"] = "cost"
+    goal_span: Span | None = field(default=None, compare=False, repr=False)
+
+    @cached_property
+    def variable_index(self) -> dict[str, int]:
+        """Index of each variable by name."""
+        return {variable.name: index for index, variable in enumerate(self.variables)}
+
+    @cached_property
+    def action_by_name(self) -> dict[str, GroundAction]:
+        """Each action by its ground name."""
+        return {action.name: action for action in self.actions}
+
+    @cached_property
+    def template_by_name(self) -> dict[str, GroundTemplate]:
+        """Each template by its ground name."""
+        return {template.name: template for template in self.templates}
+
+
+NO_CHANGE = Factor((Outcome(Fraction(1), ()),))
+NO_PRECONDITION = TRUE

@@ -1,0 +1,1 @@
+"""The resolved, still lifted model of a domain and a problem."""

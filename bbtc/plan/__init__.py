@@ -1,0 +1,1 @@
+"""Planners: from a ground task to a tree."""

@@ -1,0 +1,1 @@
+"""Belief behavior trees as data."""

@@ -1,0 +1,99 @@
+"""The belief behavior tree (BBT) as frozen data.
+
+Control nodes are memoryless: every tick starts at the first child. In a Skipper only the last
+child may contain actions; :func:`bbtc.tree.validate.check_tree` enforces it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.ground.condition import Condition
+from bbtc.ground.task import Task
+
+ControlKind: TypeAlias = Literal["sequence", "fallback", "skipper"]
+
+
+@dataclass(frozen=True, slots=True)
+class ControlNode:
+    """Sequence (→), Fallback (?) or Skipper (⇒): goes on to the next child while the child
+    returns success, failure or running, respectively.
+
+    ``template`` is the ground template this subtree was expanded from, ``reason`` the condition
+    it was inserted for, ``name`` a label of its own.
+    """
+
+    id: str
+    kind: ControlKind
+    children: tuple[Node, ...]
+    name: str | None = None
+    template: str | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionNode:
+    """Success, failure or running for a condition that is true, false or unknown."""
+
+    id: str
+    condition: Condition
+    name: str | None = None
+    template: str | None = None
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ActionNode:
+    """Starts a ground action and is running until its outcome applies; a latched node that has
+    finished returns success and never starts it again."""
+
+    id: str
+    action: str
+    latched: bool = True
+    name: str | None = None
+    template: str | None = None
+    reason: str | None = None
+
+
+Node: TypeAlias = ControlNode | ConditionNode | ActionNode
+
+Status: TypeAlias = Literal["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """A tree with the task its conditions and actions refer to, and the planner's claim.
+
+    ``success_probability`` is exact; ``target`` is the probability that was asked for.
+    """
+
+    task: Task
+    root: Node
+    success_probability: Fraction
+    target: Fraction
+    status: Status
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """Every node, parents before children, from left to right."""
+    stack = [node]
+    while stack:
+        node = stack.pop()
+        yield node
+        match node:
+            case ControlNode():
+                stack.extend(reversed(node.children))
+            case ConditionNode() | ActionNode():
+                pass
+            case _:
+                assert_never(node)
+
+
+def actions_of(node: Node) -> Iterator[ActionNode]:
+    """The action nodes, from left to right."""
+    return (n for n in walk(node) if isinstance(n, ActionNode))
