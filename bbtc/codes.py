@@ -21,4 +21,8 @@ CODES: dict[str, str] = {
     # 05xx: planning and trees
     # 06xx: artefacts
     # 07xx: exports
+    "BBT0701": "unknown export format",
+    "BBT0702": "two exporters claim one format",
+    "BBT0703": "exporter cannot be loaded",
+    "BBT0704": "wrong export option",
 }

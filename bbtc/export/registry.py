@@ -1,0 +1,159 @@
+"""The exporters: their protocol, the built-in ones, and plugins.
+
+A built-in is named in :data:`BUILT_INS` and imported when it is used. Another package adds a format by an entry
+point of the group ``bbtc.exporters`` that loads an object of the protocol :class:`Exporter`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from fractions import Fraction
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
+from typing import Protocol, TypeAlias, runtime_checkable
+
+from bbtc.diagnostics import BbtcError
+from bbtc.tree.nodes import Tree
+
+GROUP = "bbtc.exporters"
+
+OptionValue: TypeAlias = bool | int | str
+"""The value of an option; its type is that of the option's default."""
+
+Figures: TypeAlias = Mapping[str, Fraction]
+"""By node id: the probability that a tick reaches the node at least once in a run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """A declared option of an exporter. The type of ``default`` (bool, int or str) is the type of
+    the option; a str option with ``choices`` takes only those."""
+
+    name: str
+    default: OptionValue
+    help: str
+    choices: tuple[str, ...] = ()
+
+
+@runtime_checkable
+class Exporter(Protocol):
+    """A back-end. ``description`` is one line; ``suffix`` is that of its files, with the dot."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def description(self) -> str: ...
+
+    @property
+    def suffix(self) -> str: ...
+
+    @property
+    def options(self) -> tuple[Option, ...]: ...
+
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str | bytes:
+        """The artefact: text, or bytes for a binary format. ``options`` holds a value for every
+        declared option. Deterministic. Raises :class:`BbtcError` for a tree it cannot write."""
+        ...
+
+
+BUILT_INS: Mapping[str, str] = MappingProxyType(
+    {
+        "dot": "bbtc.export.graphviz:dot",
+        "svg": "bbtc.export.graphviz:svg",
+        "png": "bbtc.export.graphviz:png",
+        "btcpp": "bbtc.export.btcpp:btcpp",
+        "py_trees": "bbtc.export.pytrees:py_trees",
+    }
+)
+
+
+def format_names() -> tuple[str, ...]:
+    """Every format that can be asked for: built-ins in their order, then plugins by name."""
+    return tuple(dict.fromkeys([*BUILT_INS, *sorted(point.name for point in _plugins())]))
+
+
+def load_exporter(name: str) -> Exporter:
+    """The exporter of a format, imported now. Raises :class:`BbtcError` for an unknown format,
+    for a name that two exporters claim, and for a plugin that does not load."""
+    claims = [point for point in _plugins() if point.name == name]
+    owners = sorted({point.value for point in claims} | ({BUILT_INS[name]} if name in BUILT_INS else set()))
+    if len(owners) > 1:
+        raise BbtcError.single(
+            "BBT0702",
+            f"{len(owners)} exporters claim the format '{name}': {', '.join(owners)}",
+            hint="uninstall all of them but one",
+        )
+    if name in BUILT_INS:
+        module, attribute = BUILT_INS[name].split(":")
+        exporter: object = getattr(import_module(module), attribute)
+    elif claims:
+        exporter = _load_plugin(claims[0])
+    else:
+        raise BbtcError.single(
+            "BBT0701", f"unknown export format '{name}'", hint=_nearest(name, format_names())
+        )
+    if not isinstance(exporter, Exporter):
+        raise BbtcError.single(
+            "BBT0703", f"the plugin for the format '{name}' is not an exporter: {owners[0]}"
+        )
+    return exporter
+
+
+def parse_options(exporter: Exporter, texts: Mapping[str, str]) -> dict[str, OptionValue]:
+    """Options given as text (``key=value`` on a command line), typed, with the defaults filled in.
+    Raises :class:`BbtcError` for a name or a value that the exporter does not declare."""
+    declared = {option.name: option for option in exporter.options}
+    for key in texts:
+        if key not in declared:
+            raise BbtcError.single(
+                "BBT0704",
+                f"format '{exporter.name}' has no option '{key}'",
+                hint=_nearest(key, tuple(declared)),
+            )
+    return {
+        option.name: _parse_value(exporter.name, option, texts[option.name])
+        if option.name in texts
+        else option.default
+        for option in exporter.options
+    }
+
+
+def _parse_value(format_name: str, option: Option, text: str) -> OptionValue:
+    if isinstance(option.default, bool):
+        allowed = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+        if text.lower() in allowed:
+            return allowed[text.lower()]
+        expected = "true or false"
+    elif isinstance(option.default, int):
+        if text.removeprefix("-").isdecimal() and text.isascii() and len(text) <= 18:
+            return int(text)
+        expected = "a whole number"
+    elif not option.choices or text in option.choices:
+        return text
+    else:
+        expected = " or ".join(option.choices)
+    raise BbtcError.single(
+        "BBT0704", f"option '{option.name}' of format '{format_name}' must be {expected}, not '{text}'"
+    )
+
+
+def _plugins() -> list[EntryPoint]:
+    return list(entry_points(group=GROUP))
+
+
+def _load_plugin(point: EntryPoint) -> object:
+    try:
+        return point.load()
+    except Exception as error:  # whatever a stranger's module raises at import is its failure, not ours
+        raise BbtcError.single(
+            "BBT0703", f"the plugin for the format '{point.name}' does not load: {point.value}: {error}"
+        ) from error
+
+
+def _nearest(name: str, known: tuple[str, ...]) -> str:
+    near = get_close_matches(name, known, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known) or 'none'}"
