@@ -14,6 +14,7 @@ CODES: dict[str, str] = {
     "BBT0004": "output cannot be written",
     "BBT0005": "input exceeds a limit",
     "BBT0006": "no domain, no problem, or more than one of them",
+    "BBT0007": "a limit on time, states or nodes was reached",
     # 01xx: syntax
     # 02xx: names and types
     # 03xx: checks

@@ -1,0 +1,90 @@
+"""The Markov chain that a tree induces on the physical states it can reach.
+
+This is the paper's Algorithm 2 (self-simulation) with equal states merged: a step is a root tick
+that starts an action, and that action's outcome; a state in which no action starts is final.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
+from bbtc.belief.tick import STARTED, Status, compile_tick
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.tree.nodes import ActionNode, Node, actions_of
+
+
+class Edge(NamedTuple):
+    """A possible result of a state's action, and the index of the state it leads to."""
+
+    result: Result
+    target: int
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """States in breadth-first order from the initial ones.
+
+    ``status[i]`` is the root's status in state i; ``action[i]`` is the index (from the left) of
+    the action node it starts, -1 in a final state. ``edges[i]`` is empty exactly in final states.
+    """
+
+    actions: tuple[ActionNode, ...]
+    states: tuple[State, ...]
+    status: tuple[Status, ...]
+    action: tuple[int, ...]
+    edges: tuple[tuple[Edge, ...], ...]
+    initial: tuple[tuple[Fraction, int], ...]
+
+    @property
+    def final(self) -> list[int]:
+        """Indices of the states in which no action starts."""
+        return [index for index, action in enumerate(self.action) if action < 0]
+
+
+def explore(task: Task, root: Node, limits: Limits, transitions: dict[str, Transition] | None = None) -> Chain:
+    """Every state the tree can reach. ``transitions`` may be shared between calls on one task.
+
+    Raises :class:`bbtc.diagnostics.LimitReached` past the limit on states or time.
+    """
+    transitions = {} if transitions is None else transitions
+    actions = tuple(actions_of(root))
+    steps = []
+    for node in actions:
+        if node.action not in transitions:
+            transitions[node.action] = compile_action(task.action_by_name[node.action])
+        steps.append(transitions[node.action])
+    tick = compile_tick(root)
+    index: dict[State, int] = {}
+    states: list[State] = []
+
+    def number(state: State) -> int:
+        known = index.get(state)
+        if known is None:
+            known = index[state] = len(states)
+            states.append(state)
+        return known
+
+    initial = tuple((p, number(State(values, 0))) for values, p in initial_belief(task).items())
+    status: list[Status] = []
+    started: list[int] = []
+    edges: list[tuple[Edge, ...]] = []
+    for state in states:  # grows while it is read: breadth first
+        limits.check_states(len(states), "the simulation")
+        returned = tick(state.values, state.finished)
+        if returned < STARTED:
+            status.append(Status(returned))
+            started.append(-1)
+            edges.append(())
+            continue
+        action = returned - STARTED
+        finished = state.finished | 1 << action if actions[action].latched else state.finished
+        status.append(Status.RUNNING)
+        started.append(action)
+        edges.append(
+            tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values))
+        )
+    return Chain(actions, tuple(states), tuple(status), tuple(started), tuple(edges), initial)

@@ -1,0 +1,126 @@
+"""Scenarios: the single runs a tree can take, the most probable first; and sampled ones."""
+
+from __future__ import annotations
+
+import heapq
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+from bbtc.belief.chain import Chain
+from bbtc.belief.state import Values
+from bbtc.belief.tick import Status
+from bbtc.tree.nodes import ActionNode
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioStep:
+    """An action that was started, and the values of the variables after its outcome."""
+
+    node: ActionNode
+    values: Values
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One run: where it starts, what it does, how it ends (running: blocked)."""
+
+    probability: Fraction
+    initial: Values
+    steps: tuple[ScenarioStep, ...]
+    status: Status
+
+    @property
+    def final(self) -> Values:
+        """The values of the variables at the end."""
+        return self.steps[-1].values if self.steps else self.initial
+
+
+_Path = tuple[int, "_Path | None"]  # last state, and the path before it
+
+
+def scenarios(chain: Chain) -> Iterator[Scenario]:
+    """Every scenario in order of decreasing probability (ties in breadth-first order of the
+    states). Endless where the chain has loops: take as many as needed."""
+    queue: list[tuple[Fraction, int, _Path]] = []
+    count = 0
+    for probability, state in chain.initial:
+        heapq.heappush(queue, (-probability, count, (state, None)))
+        count += 1
+    while queue:
+        negative, _, path = heapq.heappop(queue)
+        edges = chain.edges[path[0]]
+        if not edges:
+            yield _scenario(chain, -negative, path)
+        # Results that differ in cost or reward only are one scenario.
+        merged: dict[int, Fraction] = {}
+        for edge in edges:
+            merged[edge.target] = merged.get(edge.target, Fraction(0)) + edge.result.probability
+        for target, probability in merged.items():
+            heapq.heappush(queue, (negative * probability, count, (target, path)))
+            count += 1
+
+
+def _scenario(chain: Chain, probability: Fraction, path: _Path) -> Scenario:
+    visited = []
+    at: _Path | None = path
+    while at is not None:
+        visited.append(at[0])
+        at = at[1]
+    visited.reverse()
+    return Scenario(
+        probability=probability,
+        initial=chain.states[visited[0]].values,
+        steps=tuple(
+            ScenarioStep(chain.actions[chain.action[before]], chain.states[after].values)
+            for before, after in zip(visited, visited[1:], strict=False)
+        ),
+        status=chain.status[visited[-1]],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """Result of a Monte Carlo run: how many of ``samples`` runs succeeded."""
+
+    samples: int
+    seed: int
+    successes: int
+    cut: int
+    """Runs stopped after ``max_steps`` actions without an end."""
+
+
+def sample(chain: Chain, samples: int, seed: int, max_steps: int = 100_000) -> Sampling:
+    """Simulate ``samples`` runs with a seeded generator; the same seed gives the same result."""
+    generator = random.Random(seed)
+    successes = cut = 0
+    starts = _cumulative(chain.initial)
+    moves = [_cumulative([(e.result.probability, e.target) for e in edges]) for edges in chain.edges]
+    for _ in range(samples):
+        state = _draw(generator, starts)
+        for _step in range(max_steps):
+            if not moves[state]:
+                successes += chain.status[state] is Status.SUCCESS
+                break
+            state = _draw(generator, moves[state])
+        else:
+            cut += 1
+    return Sampling(samples, seed, successes, cut)
+
+
+def _cumulative(pairs: list[tuple[Fraction, int]] | tuple[tuple[Fraction, int], ...]) -> list[tuple[Fraction, int]]:
+    total = Fraction(0)
+    cumulative = []
+    for probability, value in pairs:
+        total += probability
+        cumulative.append((total, value))
+    return cumulative
+
+
+def _draw(generator: random.Random, cumulative: list[tuple[Fraction, int]]) -> int:
+    point = Fraction(generator.getrandbits(64), 1 << 64)
+    for bound, value in cumulative:
+        if point < bound:
+            return value
+    return cumulative[-1][1]

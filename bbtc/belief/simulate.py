@@ -1,0 +1,125 @@
+"""Self-simulation (paper, Algorithm 2): the exact figures of a tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from bbtc.belief.absorption import Absorption
+from bbtc.belief.chain import Chain, explore
+from bbtc.belief.failures import FailureFinder
+from bbtc.belief.tick import Status, compile_tick
+from bbtc.ground.condition import Condition
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.tree.nodes import Node, walk
+
+
+@dataclass(frozen=True, slots=True)
+class FailureShare:
+    """A part of the failure probability and what stopped the runs of that part.
+
+    ``status`` is failure where ``condition`` was false and running where it was unknown and
+    nothing observed it (blocked). ``condition`` is None where no condition failed in the last
+    tick (an empty control node).
+    """
+
+    node: str
+    condition: Condition | None
+    status: Status
+    probability: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What a tree does, exactly. The probabilities of success, failure, blocked and endless sum
+    to 1. Costs and numbers of actions are expectations; None is infinite, or, given success,
+    undefined because success is impossible."""
+
+    success: Fraction
+    failure: Fraction
+    blocked: Fraction
+    endless: Fraction
+    failures: tuple[FailureShare, ...]
+    cost: Fraction | None
+    cost_given_success: Fraction | None
+    actions: Fraction | None
+    actions_given_success: Fraction | None
+    reward: Fraction | None
+    states: int
+
+
+def simulate(task: Task, root: Node, limits: Limits) -> Figures:
+    """The figures of a tree from the task's initial belief. Raises ``LimitReached``."""
+    return figures(root, explore(task, root, limits))
+
+
+def figures(root: Node, chain: Chain) -> Figures:
+    """The figures of a tree whose chain is known."""
+    absorption = Absorption(chain)
+    visits = absorption.visits()
+    endless = absorption.entering()
+    mass = {status: Fraction(0) for status in Status}
+    for state in chain.final:
+        mass[chain.status[state]] += visits[state] or 0
+    success = mass[Status.SUCCESS]
+    wins = absorption.hitting({s: Fraction(1) for s in chain.final if chain.status[s] is Status.SUCCESS})
+    cost, actions, reward = Fraction(0), Fraction(0), Fraction(0)
+    won_cost, won_actions = Fraction(0), Fraction(0)
+    for state, edges in enumerate(chain.edges):
+        visit = visits[state]
+        if visit is None:
+            continue
+        for edge in edges:
+            weight = visit * edge.result.probability
+            won = weight * wins[edge.target]
+            cost += weight * edge.result.cost
+            reward += weight * edge.result.reward
+            actions += weight
+            won_cost += won * edge.result.cost
+            won_actions += won
+    return Figures(
+        success=success,
+        failure=mass[Status.FAILURE],
+        blocked=mass[Status.RUNNING],
+        endless=endless,
+        failures=_shares(root, chain, visits),
+        cost=None if endless else cost,
+        cost_given_success=won_cost / success if success else None,
+        actions=None if endless else actions,
+        actions_given_success=won_actions / success if success else None,
+        reward=None if endless else reward,
+        states=len(chain.states),
+    )
+
+
+def _shares(root: Node, chain: Chain, visits: list[Fraction | None]) -> tuple[FailureShare, ...]:
+    finder = FailureFinder(root)
+    shares: dict[tuple[str, Condition | None, Status], Fraction] = {}
+    for state in chain.final:
+        probability = visits[state]
+        if chain.status[state] is Status.SUCCESS or not probability:
+            continue
+        failing = finder.failing(chain.states[state])
+        key: tuple[str, Condition | None, Status] = (root.id, None, chain.status[state])
+        if failing:
+            key = (failing[0].node.id, failing[0].node.condition, failing[0].status)
+        shares[key] = shares.get(key, Fraction(0)) + probability
+    order = {node.id: position for position, node in enumerate(walk(root))}
+    ranked = sorted(shares.items(), key=lambda item: (-item[1], order[item[0][0]], item[0][2]))
+    return tuple(FailureShare(node, condition, status, p) for (node, condition, status), p in ranked)
+
+
+def flow(root: Node, chain: Chain) -> dict[str, Fraction]:
+    """For every node, the probability that a run ticks it at least once."""
+    absorption = Absorption(chain)
+    ticked: dict[str, dict[int, Fraction]] = {node.id: {} for node in walk(root)}
+    state = 0
+
+    def observe(node: Node, _status: int) -> None:
+        ticked[node.id][state] = Fraction(1)
+
+    tick = compile_tick(root, observe)
+    for state, physical in enumerate(chain.states):
+        tick(physical.values, physical.finished)
+    return {node: absorption.start(absorption.hitting(states)) for node, states in ticked.items()}

@@ -1,0 +1,143 @@
+"""Physical states, and the distribution of states an action leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from typing import NamedTuple, TypeAlias
+
+from bbtc.ground.condition import compile_condition
+from bbtc.ground.task import Effect, Factor, GroundAction, Task
+from bbtc.kleene import Truth
+
+Values: TypeAlias = bytes
+"""The truth value of every variable of the task, by index."""
+
+
+class State(NamedTuple):
+    """A physical state: the values of the variables, and which latched action nodes have
+    finished (bit i stands for the tree's i-th action node from the left)."""
+
+    values: Values
+    finished: int
+
+
+class Result(NamedTuple):
+    """One possible result of an action: its probability, cost (of the action and this outcome),
+    reward, and the values after it."""
+
+    probability: Fraction
+    cost: Fraction
+    reward: Fraction
+    values: Values
+
+
+Transition: TypeAlias = Callable[[Values], tuple[Result, ...]]
+
+
+def initial_belief(task: Task) -> dict[Values, Fraction]:
+    """The task's initial distribution over assignments, equal ones merged."""
+    belief: dict[Values, Fraction] = {}
+    for initial in task.initial:
+        values = bytes(initial.values)
+        belief[values] = belief.get(values, Fraction(0)) + initial.probability
+    return belief
+
+
+_Delta: TypeAlias = tuple[tuple[int, int], ...]
+_Draw: TypeAlias = tuple[_Delta, Fraction, Fraction]  # sets, cost, reward
+
+
+def compile_action(action: GroundAction) -> Transition:
+    """The action as a function from values to its results: equal results merged, most probable
+    first (ties by values). Results are cached per assignment."""
+    drawers = [_compile_factor(factor) for factor in action.factors]
+    cache: dict[Values, tuple[Result, ...]] = {}
+
+    def results(values: Values) -> tuple[Result, ...]:
+        known = cache.get(values)
+        if known is None:
+            known = cache[values] = _results(values, action.cost, _product(values, drawers))
+        return known
+
+    return results
+
+
+def _results(
+    values: Values, cost: Fraction, draws: dict[_Draw, Fraction]
+) -> tuple[Result, ...]:
+    merged: dict[tuple[Values, Fraction, Fraction], Fraction] = {}
+    for (delta, extra, reward), probability in draws.items():
+        after = bytearray(values)
+        for variable, value in delta:
+            after[variable] = value
+        key = (bytes(after), cost + extra, reward)
+        merged[key] = merged.get(key, Fraction(0)) + probability
+    results = [Result(p, c, r, v) for (v, c, r), p in merged.items()]
+    return tuple(sorted(results, key=lambda r: (-r.probability, r.values, r.cost, r.reward)))
+
+
+_Drawer: TypeAlias = Callable[[Values], dict[_Draw, Fraction]]
+
+
+def _product(values: Values, drawers: Iterable[_Drawer]) -> dict[_Draw, Fraction]:
+    """Independent draws combined: sets united (the Kleene maximum where they clash), costs and
+    rewards added, equal combinations merged at once so that only distinct results multiply."""
+    total: dict[_Draw, Fraction] = {((), Fraction(0), Fraction(0)): Fraction(1)}
+    for drawer in drawers:
+        drawn = drawer(values)
+        combined: dict[_Draw, Fraction] = {}
+        for (delta, cost, reward), p in total.items():
+            for (delta2, cost2, reward2), p2 in drawn.items():
+                key = (_unite(delta, delta2), cost + cost2, reward + reward2)
+                combined[key] = combined.get(key, Fraction(0)) + p * p2
+        total = combined
+    return total
+
+
+def _unite(first: _Delta, second: _Delta) -> _Delta:
+    if not first or not second:
+        return first or second
+    united = dict(first)
+    for variable, value in second:
+        united[variable] = max(value, united.get(variable, Truth.FALSE))
+    return tuple(sorted(united.items()))
+
+
+def _compile_factor(factor: Factor) -> _Drawer:
+    outcomes = [
+        (o.probability, o.cost, o.reward, _compile_effects(o.effects), [_compile_factor(f) for f in o.factors])
+        for o in factor.outcomes
+    ]
+
+    def draw(values: Values) -> dict[_Draw, Fraction]:
+        drawn: dict[_Draw, Fraction] = {}
+        for probability, cost, reward, effects, nested in outcomes:
+            delta = effects(values)
+            for (delta2, cost2, reward2), p in _product(values, nested).items():
+                key = (_unite(delta, delta2), cost + cost2, reward + reward2)
+                drawn[key] = drawn.get(key, Fraction(0)) + probability * p
+        return drawn
+
+    return draw
+
+
+def _compile_effects(effects: tuple[Effect, ...]) -> Callable[[Values], _Delta]:
+    always = _sets(s for e in effects if e.when is None for s in e.sets)
+    guarded = [(compile_condition(e.when), _sets(e.sets)) for e in effects if e.when is not None]
+
+    def delta(values: Values) -> _Delta:
+        united = always
+        for guard, sets in guarded:
+            if guard(values) == Truth.TRUE:
+                united = _unite(united, sets)
+        return united
+
+    return delta
+
+
+def _sets(sets: Iterable[tuple[int, Truth]]) -> _Delta:
+    united: dict[int, int] = {}
+    for variable, value in sets:
+        united[variable] = max(int(value), united.get(variable, 0))
+    return tuple(sorted(united.items()))

@@ -1,0 +1,44 @@
+"""Bounds on time and size that every long computation honours."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+from bbtc.diagnostics import Diagnostic, LimitReached
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Bounds for one run; ``None`` means no bound.
+
+    ``seconds`` counts from the moment the object is made. ``states`` bounds the physical states
+    of one simulation, ``nodes`` the nodes of a tree.
+    """
+
+    seconds: float | None = None
+    states: int = 1_000_000
+    nodes: int = 10_000
+    _start: float = field(default_factory=time.monotonic, compare=False, repr=False)
+
+    def check_time(self, doing: str) -> None:
+        """Raise :class:`LimitReached` once the time is over."""
+        if self.seconds is not None and time.monotonic() - self._start > self.seconds:
+            raise self.reached(f"the time limit of {self.seconds:g} s ended {doing}", "--time-limit")
+
+    def check_states(self, count: int, doing: str) -> None:
+        """Raise :class:`LimitReached` if ``count`` states are too many, or the time is over."""
+        if count > self.states:
+            raise self.reached(f"the limit of {self.states} states ended {doing}", "--max-states")
+        if count % 256 == 0:
+            self.check_time(doing)
+
+    def check_nodes(self, count: int) -> None:
+        """Raise :class:`LimitReached` if a tree of ``count`` nodes is too large."""
+        if count > self.nodes:
+            raise self.reached(f"the limit of {self.nodes} tree nodes ended planning", "--max-nodes")
+
+    @staticmethod
+    def reached(message: str, option: str) -> LimitReached:
+        """The exception for a limit that ``option`` raises."""
+        return LimitReached([Diagnostic("BBT0007", message, hint=f"raise it with {option}")])
