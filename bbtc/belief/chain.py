@@ -45,7 +45,9 @@ class Chain:
         return [index for index, action in enumerate(self.action) if action < 0]
 
 
-def explore(task: Task, root: Node, limits: Limits, transitions: dict[str, Transition] | None = None) -> Chain:
+def explore(
+    task: Task, root: Node, limits: Limits, transitions: dict[str, Transition] | None = None
+) -> Chain:
     """Every state the tree can reach. ``transitions`` may be shared between calls on one task.
 
     Raises :class:`bbtc.diagnostics.LimitReached` past the limit on states or time.
@@ -57,7 +59,7 @@ def explore(task: Task, root: Node, limits: Limits, transitions: dict[str, Trans
         if node.action not in transitions:
             transitions[node.action] = compile_action(task.action_by_name[node.action])
         steps.append(transitions[node.action])
-    tick = compile_tick(root)
+    tick = compile_tick(task, root)
     index: dict[State, int] = {}
     states: list[State] = []
 

@@ -6,13 +6,17 @@ from typing import NamedTuple
 
 from bbtc.belief.state import State
 from bbtc.belief.tick import Status, compile_tick
-from bbtc.tree.nodes import ConditionNode, ControlNode, Node
+from bbtc.ground.condition import Condition, conjuncts, evaluate
+from bbtc.ground.task import Task
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
 
 class Failing(NamedTuple):
-    """A condition node that a tick found false (failure) or unknown (running)."""
+    """A condition that a tick found false (failure) or unknown (running): that of a condition
+    node, or a conjunct of a guarded action's precondition."""
 
-    node: ConditionNode
+    node: str
+    condition: Condition
     status: Status
     depth: int
 
@@ -20,14 +24,15 @@ class Failing(NamedTuple):
 class FailureFinder:
     """Finds the conditions that fail in a state, for one tree."""
 
-    def __init__(self, root: Node) -> None:
+    def __init__(self, task: Task, root: Node) -> None:
         self._depth = _depths(root)
-        self._seen: list[Failing] = []
-        self._tick = compile_tick(root, self._observe)
+        self._seen: list[tuple[ConditionNode | ActionNode, int]] = []
+        self._task = task
+        self._tick = compile_tick(task, root, self._observe)
 
     def _observe(self, node: Node, status: int) -> None:
-        if isinstance(node, ConditionNode) and status != Status.SUCCESS:
-            self._seen.append(Failing(node, Status(status), self._depth[node.id]))
+        if not isinstance(node, ControlNode) and status < Status.SUCCESS:
+            self._seen.append((node, status))
 
     def failing(self, state: State) -> list[Failing]:
         """The conditions ticked and not true, deepest first; of equals, the last ticked first.
@@ -37,7 +42,17 @@ class FailureFinder:
         """
         self._seen.clear()
         self._tick(state.values, state.finished)
-        return sorted(reversed(self._seen), key=lambda f: -f.depth)
+        found = [
+            Failing(node.id, self._condition(node, state), Status(status), self._depth[node.id])
+            for node, status in reversed(self._seen)
+        ]
+        return sorted(found, key=lambda f: -f.depth)
+
+    def _condition(self, node: ConditionNode | ActionNode, state: State) -> Condition:
+        if isinstance(node, ConditionNode):
+            return node.condition
+        precondition = self._task.action_by_name[node.action].precondition
+        return min(conjuncts(precondition), key=lambda part: evaluate(part, state.values))
 
 
 def _depths(root: Node) -> dict[str, int]:

@@ -51,10 +51,10 @@ class Figures:
 
 def simulate(task: Task, root: Node, limits: Limits) -> Figures:
     """The figures of a tree from the task's initial belief. Raises ``LimitReached``."""
-    return figures(root, explore(task, root, limits))
+    return figures(task, root, explore(task, root, limits))
 
 
-def figures(root: Node, chain: Chain) -> Figures:
+def figures(task: Task, root: Node, chain: Chain) -> Figures:
     """The figures of a tree whose chain is known."""
     absorption = Absorption(chain)
     visits = absorption.visits()
@@ -83,7 +83,7 @@ def figures(root: Node, chain: Chain) -> Figures:
         failure=mass[Status.FAILURE],
         blocked=mass[Status.RUNNING],
         endless=endless,
-        failures=_shares(root, chain, visits),
+        failures=_shares(task, root, chain, visits),
         cost=None if endless else cost,
         cost_given_success=won_cost / success if success else None,
         actions=None if endless else actions,
@@ -93,8 +93,10 @@ def figures(root: Node, chain: Chain) -> Figures:
     )
 
 
-def _shares(root: Node, chain: Chain, visits: list[Fraction | None]) -> tuple[FailureShare, ...]:
-    finder = FailureFinder(root)
+def _shares(
+    task: Task, root: Node, chain: Chain, visits: list[Fraction | None]
+) -> tuple[FailureShare, ...]:
+    finder = FailureFinder(task, root)
     shares: dict[tuple[str, Condition | None, Status], Fraction] = {}
     for state in chain.final:
         probability = visits[state]
@@ -103,14 +105,14 @@ def _shares(root: Node, chain: Chain, visits: list[Fraction | None]) -> tuple[Fa
         failing = finder.failing(chain.states[state])
         key: tuple[str, Condition | None, Status] = (root.id, None, chain.status[state])
         if failing:
-            key = (failing[0].node.id, failing[0].node.condition, failing[0].status)
+            key = (failing[0].node, failing[0].condition, failing[0].status)
         shares[key] = shares.get(key, Fraction(0)) + probability
     order = {node.id: position for position, node in enumerate(walk(root))}
     ranked = sorted(shares.items(), key=lambda item: (-item[1], order[item[0][0]], item[0][2]))
     return tuple(FailureShare(node, condition, status, p) for (node, condition, status), p in ranked)
 
 
-def flow(root: Node, chain: Chain) -> dict[str, Fraction]:
+def flow(task: Task, root: Node, chain: Chain) -> dict[str, Fraction]:
     """For every node, the probability that a run ticks it at least once."""
     absorption = Absorption(chain)
     ticked: dict[str, dict[int, Fraction]] = {node.id: {} for node in walk(root)}
@@ -119,7 +121,7 @@ def flow(root: Node, chain: Chain) -> dict[str, Fraction]:
     def observe(node: Node, _status: int) -> None:
         ticked[node.id][state] = Fraction(1)
 
-    tick = compile_tick(root, observe)
+    tick = compile_tick(task, root, observe)
     for state, physical in enumerate(chain.states):
         tick(physical.values, physical.finished)
     return {node: absorption.start(absorption.hitting(states)) for node, states in ticked.items()}

@@ -13,7 +13,9 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.ground.condition import compile_condition
+from bbtc.ground.condition import TRUE, Condition, compile_condition
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of
 
 
@@ -37,7 +39,7 @@ Tick: TypeAlias = Callable[[Sequence[int], int], int]
 Observer: TypeAlias = Callable[[Node, int], None]
 
 
-def compile_tick(root: Node, observe: Observer | None = None) -> Tick:
+def compile_tick(task: Task, root: Node, observe: Observer | None = None) -> Tick:
     """The tree as a function from values and finished latches to a status number, or
     ``STARTED + i``. ``observe`` is told every node ticked and what it returned, in the order in
     which the nodes return.
@@ -48,9 +50,10 @@ def compile_tick(root: Node, observe: Observer | None = None) -> Tick:
         match node:
             case ConditionNode():
                 test = compile_condition(node.condition)
-                tick: Tick = lambda values, finished: test(values)  # noqa: E731
+                tick: Tick = lambda values, _: test(values)  # noqa: E731
             case ActionNode():
-                tick = _action(order[node.id], node.latched)
+                guard = task.action_by_name[node.action].precondition if node.guarded else TRUE
+                tick = _action(order[node.id], node.latched, guard)
             case ControlNode():
                 tick = _control(node.kind, [build(child) for child in node.children])
             case _:
@@ -60,11 +63,19 @@ def compile_tick(root: Node, observe: Observer | None = None) -> Tick:
     return build(root)
 
 
-def _action(index: int, latched: bool) -> Tick:
-    bit, started = 1 << index, STARTED + index
-    if not latched:
-        return lambda values, finished: started
-    return lambda values, finished: Status.SUCCESS if finished & bit else started
+def _action(index: int, latched: bool, guard: Condition) -> Tick:
+    bit, started = (1 << index if latched else 0), STARTED + index
+    if guard == TRUE:
+        return lambda _, finished: Status.SUCCESS if finished & bit else started
+    test = compile_condition(guard)
+
+    def tick(values: Sequence[int], finished: int) -> int:
+        if finished & bit:
+            return Status.SUCCESS
+        holds = test(values)
+        return started if holds == Truth.TRUE else holds
+
+    return tick
 
 
 def _control(kind: str, children: list[Tick]) -> Tick:

@@ -1,1 +1,1 @@
-"""The resolved, still lifted model of a domain and a problem."""
+"""The resolved model: every name bound to its declaration, still lifted."""

@@ -50,11 +50,17 @@ class ConditionNode:
 @dataclass(frozen=True, slots=True)
 class ActionNode:
     """Starts a ground action and is running until its outcome applies; a latched node that has
-    finished returns success and never starts it again."""
+    finished returns success and never starts it again.
+
+    A ``guarded`` node, before it starts, reads the action's precondition as a condition would and
+    returns failure or running unless it is true. Template bodies use it: there no condition nodes
+    of their own stand before an action, and its own effect may end its precondition.
+    """
 
     id: str
     action: str
     latched: bool = True
+    guarded: bool = False
     name: str | None = None
     template: str | None = None
     reason: str | None = None
