@@ -1,0 +1,72 @@
+# The tasks of this repository. Needed: GNU make and Python 3.10 or newer with its venv module.
+# Each target makes the environment it needs under .venv/ at first use.
+
+PYTHON ?= python3
+PYTEST_ARGS ?= -n auto
+DOMAIN := domains/household/domain.pddl
+PROBLEM := domains/household/look-for-soda.pddl
+OUT := build/household
+BBTC := .venv/demo/bin/bbtc
+PIP_INSTALL := -m pip install --quiet --disable-pip-version-check
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint format golden clean python-version
+
+help:
+	@echo "make demo    from the household domain to trees that run, into $(OUT)/"
+	@echo "make test    all tests"
+	@echo "make lint    ruff, mypy, import layers"
+	@echo "make format  lay out the Python code"
+	@echo "make golden  all tests, rewriting the golden files that drifted"
+	@echo "make clean   remove what these targets made"
+
+# --- what the README shows -------------------------------------------------------------------
+
+demo: .venv/demo/.installed
+	@mkdir -p $(OUT)
+	$(BBTC) check $(DOMAIN) $(PROBLEM)
+	$(BBTC) compile $(DOMAIN) $(PROBLEM) -o $(OUT)/task.json
+	$(BBTC) plan $(DOMAIN) $(PROBLEM) -o $(OUT)/tree.json
+	$(BBTC) simulate $(OUT)/tree.json
+	$(BBTC) export $(OUT)/tree.json --to dot -o $(OUT)/tree.dot
+	$(BBTC) export $(OUT)/tree.json --to svg -o $(OUT)/tree.svg
+	$(BBTC) export $(OUT)/tree.json --to btcpp -o $(OUT)/tree.xml
+	$(BBTC) export $(OUT)/tree.json --to py_trees -o $(OUT)/tree.py
+	.venv/demo/bin/python $(OUT)/tree.py
+	@echo "Written to $(OUT)/:"
+	@ls $(OUT)
+
+test: .venv/dev/.installed
+	.venv/dev/bin/python -m pytest $(PYTEST_ARGS)
+
+# --- for those who work on it ----------------------------------------------------------------
+
+lint: .venv/dev/.installed
+	.venv/dev/bin/ruff check .
+	.venv/dev/bin/ruff format --check .
+	.venv/dev/bin/mypy
+	.venv/dev/bin/lint-imports --no-logo
+
+format: .venv/dev/.installed
+	.venv/dev/bin/ruff check --fix .
+	.venv/dev/bin/ruff format .
+
+golden: .venv/dev/.installed
+	.venv/dev/bin/python -m pytest $(PYTEST_ARGS) --update-golden
+
+clean:
+	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+
+# --- environments ----------------------------------------------------------------------------
+
+.venv/demo/.installed: EXTRA := py-trees
+.venv/dev/.installed: EXTRA := dev
+
+.venv/%/.installed: pyproject.toml | python-version
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python $(PIP_INSTALL) --editable ".[$(EXTRA)]"
+	@touch $@
+
+python-version:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
+	  { echo "$(PYTHON) is not Python 3.10 or newer; say which one to use: make PYTHON=python3.12 …" >&2; exit 1; }

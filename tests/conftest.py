@@ -1,0 +1,97 @@
+"""Fixtures shared by all tests: golden files, and the input collections beside the repository."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+GOLDEN = Path(__file__).resolve().parent / "golden"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--update-golden",
+        action="store_true",
+        help="write the golden files that are missing or differ, instead of failing",
+    )
+
+
+@dataclass(frozen=True)
+class Golden:
+    """Compares artefacts with the files under ``tests/golden/``."""
+
+    update: bool
+
+    def __call__(self, path: str, actual: str | bytes) -> None:
+        """Fail unless ``actual`` is, byte for byte, the content of ``tests/golden/<path>``."""
+        file = GOLDEN / path
+        data = actual.encode() if isinstance(actual, str) else actual
+        expected = file.read_bytes() if file.exists() else None
+        if data == expected:
+            return
+        if self.update:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(data)
+        elif expected is None:
+            pytest.fail(f"no golden file tests/golden/{path}; run with --update-golden and read it", False)
+        else:
+            pytest.fail(_drift(path, expected, data), pytrace=False)
+
+
+def _drift(path: str, expected: bytes, actual: bytes) -> str:
+    try:
+        lines = expected.decode().splitlines(True), actual.decode().splitlines(True)
+    except UnicodeDecodeError:
+        return f"tests/golden/{path} differs (binary)"
+    diff = list(difflib.unified_diff(*lines, f"golden/{path}", "now"))
+    shown = "".join(line if line.endswith("\n") else f"{line}\n" for line in diff[:200])
+    rest = f"… {len(diff) - 200} more lines\n" if len(diff) > 200 else ""
+    return f"tests/golden/{path} drifted (--update-golden accepts it):\n{shown}{rest}"
+
+
+@pytest.fixture
+def golden(request: pytest.FixtureRequest) -> Golden:
+    """Call it with a path under ``tests/golden/`` and the text or bytes that should stand there."""
+    return Golden(bool(request.config.getoption("--update-golden")))
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The top of this repository."""
+    return REPOSITORY
+
+
+def shared_folder() -> Path | None:
+    """The folder of shared inputs beside the repository, if it is there."""
+    folder = REPOSITORY.parent / "shared"
+    return folder if folder.is_dir() else None
+
+
+def corpus_folder() -> Path | None:
+    """The corpus of public planning files: ``$BBTC_CORPUS``, or ``corpus`` in the shared folder."""
+    named = os.environ.get("BBTC_CORPUS")
+    folder = Path(named) if named else REPOSITORY.parent / "shared" / "corpus"
+    return folder if folder.is_dir() else None
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of shared inputs; skips the test where it is absent."""
+    folder = shared_folder()
+    if folder is None:
+        pytest.skip("no folder ../shared beside the repository")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def corpus() -> Path:
+    """The corpus; skips the test where it is absent."""
+    folder = corpus_folder()
+    if folder is None:
+        pytest.skip("no corpus: set BBTC_CORPUS, or put it at ../shared/corpus")
+    return folder
