@@ -401,6 +401,18 @@ class Derived:
 
 
 @dataclass(frozen=True, slots=True)
+class Sensor:
+    """``(:sensor name :parameters … :condition f :sensed f)``: whenever the condition holds, what is
+    sensed becomes known without any action."""
+
+    name: Name
+    parameters: TypedList
+    condition: Formula | None
+    sensed: Formula
+    span: Span = _span()
+
+
+@dataclass(frozen=True, slots=True)
 class Template:
     """``(:template name :parameters … :precondition … :effect <guide> :body <tree>)``."""
 
@@ -437,7 +449,34 @@ class InitClause:
     span: Span = _span()
 
 
-InitElement: TypeAlias = Assign | EffectAnd | Probabilistic | OneOf | FluentValue | InitClause | Unsupported | Empty
+@dataclass(frozen=True, slots=True)
+class InitAnd:
+    """``(and …)`` in ``:init``: unlike an effect's, its parts may be clauses and numbers."""
+
+    parts: tuple[InitElement, ...]
+    span: Span = _span()
+
+
+@dataclass(frozen=True, slots=True)
+class Invariant:
+    """``(invariant f…)`` in ``:init``: at least one of the formulas holds in every reachable state."""
+
+    parts: tuple[Formula, ...]
+    span: Span = _span()
+
+
+InitElement: TypeAlias = (
+    Assign
+    | InitAnd
+    | EffectForall
+    | Probabilistic
+    | OneOf
+    | FluentValue
+    | InitClause
+    | Invariant
+    | Unsupported
+    | Empty
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -445,6 +484,15 @@ class Init:
     """``(:init …)``."""
 
     elements: tuple[InitElement, ...]
+    span: Span = _span()
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """``(:hidden literal…)``: the true state a simulator hides from the planner. It says nothing a
+    planner may use."""
+
+    facts: tuple[Assign, ...]
     span: Span = _span()
 
 
@@ -481,9 +529,11 @@ Section: TypeAlias = (
     | Functions
     | Action
     | Derived
+    | Sensor
     | Template
     | DomainReference
     | Init
+    | Hidden
     | Goal
     | GoalNumber
     | Metric
