@@ -151,6 +151,16 @@ class GroundTemplate:
 
 
 @dataclass(frozen=True, slots=True)
+class Signature:
+    """The parameter names of a predicate or an action schema, as declared, without ``?``. They name
+    the ports and arguments of exported leaves; where a task has none, exporters number them."""
+
+    kind: Literal["predicate", "action"]
+    symbol: str
+    parameters: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class InitialState:
     """A possible initial state: one value for every variable."""
 
@@ -160,7 +170,8 @@ class InitialState:
 
 @dataclass(frozen=True)
 class Task:
-    """A ground planning task. Actions, templates and variables are sorted by name."""
+    """A ground planning task. Actions, templates and variables are sorted by name, signatures by
+    kind and symbol."""
 
     domain: str
     problem: str
@@ -172,6 +183,7 @@ class Task:
     goal_probability: Fraction = Fraction(1)
     goal_reward: Fraction = Fraction(0)
     metric: Literal["cost", "reward"] = "cost"
+    signatures: tuple[Signature, ...] = ()
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property
