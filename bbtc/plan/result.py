@@ -1,0 +1,59 @@
+"""What a planner returns: the tree, its figures, and the refinements that led to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, Protocol, TypeAlias
+
+from bbtc.belief.simulate import Figures
+from bbtc.diagnostics import Diagnostic
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.tree.nodes import Tree
+
+
+@dataclass(frozen=True, slots=True)
+class Refinement:
+    """One step of a planner: what stopped the runs, what was done about it, what came of it.
+
+    ``condition`` was ``value`` in runs of total probability ``probability``; ``inserted`` names
+    the action or template inserted (None for a move), which makes the condition hold with
+    probability ``chance`` once its preconditions hold, ``unmet`` of which did not hold yet.
+    ``success`` is the tree's success probability afterwards.
+    """
+
+    kind: Literal["insert", "move"]
+    condition: str
+    value: Truth
+    probability: Fraction
+    inserted: str | None
+    chance: Fraction | None
+    unmet: int
+    success: Fraction
+    nodes: int
+
+
+Progress: TypeAlias = Callable[[Refinement], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A planner's answer. ``initial_success`` is the probability before any refinement; ``stop``
+    says which limit ended the search, if one did."""
+
+    tree: Tree
+    figures: Figures
+    initial_success: Fraction
+    refinements: tuple[Refinement, ...]
+    stop: Diagnostic | None = None
+
+
+class Strategy(Protocol):
+    """A planner: from a ground task and a target probability to a plan. Always returns."""
+
+    def __call__(self, task: Task, target: Fraction, limits: Limits, progress: Progress) -> Plan:
+        """Plan. ``progress`` is told every refinement as it is made."""
+        ...

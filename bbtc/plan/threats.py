@@ -1,0 +1,82 @@
+"""Threats: an action of a later branch undid a condition that an earlier branch needs.
+
+Source: the paper's section "Iterative Behavior Tree Expansion", after Colledanchise, Almeida,
+Ögren, "Towards Blended Reactive Planning and Acting using Behavior Trees" (2019): the branch of
+the threatening action is moved before the threatened condition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bbtc.ground.condition import Condition, evaluate
+from bbtc.kleene import Truth
+from bbtc.plan.choose import Target
+from bbtc.plan.draft import Attempt, Draft, Subgoal
+from bbtc.plan.relaxed import effects_of
+
+
+@dataclass(frozen=True, slots=True)
+class Threat:
+    """``siblings[later]`` holds an executed action that undoes what ``siblings[earlier]`` needs."""
+
+    siblings: list[Subgoal]
+    earlier: int
+    later: int
+    action: str
+
+    def resolve(self) -> None:
+        """Move the later branch before the earlier one."""
+        self.siblings.insert(self.earlier, self.siblings.pop(self.later))
+
+
+def find_threat(
+    draft: Draft,
+    target: Target,
+    started: frozenset[Attempt],
+    moved: set[tuple[Subgoal, Subgoal]],
+) -> Threat | None:
+    """The innermost threat to a target among the attempts that were ``started`` in its states, if
+    the pair of branches was not ``moved`` before (in either direction)."""
+    if target.value is not Truth.FALSE:
+        return None
+    subgoal = target.subgoal
+    while True:
+        siblings = subgoal.parent.preconditions if subgoal.parent is not None else draft.goals
+        earlier = next(i for i, sibling in enumerate(siblings) if sibling is subgoal)
+        for later in range(earlier + 1, len(siblings)):
+            pair = (subgoal, siblings[later])
+            if pair in moved or pair[::-1] in moved:
+                continue
+            for attempt in _attempts(siblings[later]):
+                if attempt in started and undoes(attempt, target.subgoal.condition, target):
+                    assert attempt.doing is not None
+                    return Threat(siblings, earlier, later, attempt.doing.name)
+        if subgoal.parent is None:
+            return None
+        subgoal = subgoal.parent.subgoal
+
+
+def undoes(attempt: Attempt, condition: Condition, target: Target) -> bool:
+    """Can what was attempted make the condition other than true, as it is in the target's states?"""
+    if attempt.doing is None:
+        return False
+    for effect in effects_of(attempt.doing.factors):
+        for state, _ in target.states:
+            # The state without the effect: was the condition true before these values were set?
+            values = bytearray(state.values)
+            for variable, value in effect.sets:
+                if values[variable] == value:
+                    values[variable] = 2 - value
+            if evaluate(condition, values) is Truth.TRUE:
+                return True
+    return False
+
+
+def _attempts(subgoal: Subgoal) -> Iterator[Attempt]:
+    stack = [subgoal]
+    while stack:
+        for attempt in stack.pop().attempts():
+            yield attempt
+            stack.extend(attempt.preconditions)
