@@ -1,0 +1,158 @@
+"""Templates: bodies resolved, and the two rules they obey."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from typing_extensions import assert_never
+
+from bbtc.analysis.formulas import effect, formula, inner_scope
+from bbtc.analysis.names import Names, Scope
+from bbtc.diagnostics import Related, Report
+from bbtc.model import domain as md
+from bbtc.model import formula as mf
+from bbtc.syntax import ast
+
+
+def template(names: Names, node: ast.Template) -> md.Template:
+    """A template; parts with errors, which are reported, count as true conditions."""
+    signature = names.templates[node.name.key]
+    scope = {parameter.name: parameter for parameter in signature.parameters}
+    return md.Template(
+        node.name.key,
+        signature.parameters,
+        mf.ALWAYS if node.precondition is None else formula(names, node.precondition, scope),
+        None if node.effect is None else effect(names, node.effect, scope),
+        _body(names, node.body, scope),
+        node.span,
+    )
+
+
+def _body(names: Names, node: ast.Body, scope: Scope) -> md.Body:
+    match node:
+        case ast.BodyControl(kind, children, span):
+            return md.BodyControl(kind, tuple(_body(names, child, scope) for child in children), span)
+        case ast.BodyCondition(condition, span):
+            return md.BodyCondition(formula(names, condition, scope), span)
+        case ast.BodyCall():
+            return _call(names, node, scope)
+        case ast.BodyForeach(groups, child, span):
+            parameters, inside = inner_scope(names, groups, scope)
+            return md.BodyForeach(parameters, _body(names, child, inside), span)
+        case _:
+            assert_never(node)
+
+
+def _call(names: Names, node: ast.BodyCall, scope: Scope) -> md.Body:
+    key = node.name.key
+    action, called = names.actions.get(key), names.templates.get(key)
+    found = action if action is not None or node.kind == "action" else called
+    failed = md.BodyCondition(mf.ALWAYS, node.span)
+    if found is None:
+        kind = "action" if node.kind == "action" else "action or template"
+        known = names.actions if node.kind == "action" else {**names.actions, **names.templates}
+        names.unknown("BBT0205", kind, node.name, known)
+        for arg in node.args:
+            names.term(arg, scope)
+        return failed
+    word = "action" if found is action else "template"
+    args = names.arguments(word, node.name, found, node.args, scope, span=node.span)
+    if args is None:
+        return failed
+    return md.BodyCall("action" if found is action else "template", key, args, node.span)
+
+
+# --- rules -----------------------------------------------------------------------------------
+
+
+def calls(body: md.Body) -> Iterator[md.BodyCall]:
+    """The calls in a body, from left to right."""
+    match body:
+        case md.BodyCall():
+            yield body
+        case md.BodyControl(_, children):
+            for child in children:
+                yield from calls(child)
+        case md.BodyForeach(_, child):
+            yield from calls(child)
+        case md.BodyCondition():
+            return
+        case _:
+            assert_never(body)
+
+
+def check_templates(report: Report, templates: Mapping[str, md.Template]) -> None:
+    """No template may call itself, however far down; in a Skipper only the last child may
+    contain actions (with more, our simulator and the execution engines part ways)."""
+    called = {
+        name: [call for call in calls(each.body) if call.kind == "template" and call.name in templates]
+        for name, each in templates.items()
+    }
+    acting = _acting(templates)
+    for name, each in templates.items():
+        for call in called[name]:
+            if name in _reachable(call.name, called):
+                way = "itself" if call.name == name else f"itself through `{call.name}`"
+                report.error(
+                    "BBT0215",
+                    f"template `{name}` calls {way}",
+                    call.span,
+                    "a template is expanded into a finite tree",
+                    [Related(f"`{name}` is declared here", each.span)],
+                )
+        _check_skippers(report, each.body, acting)
+
+
+def _reachable(start: str, called: Mapping[str, list[md.BodyCall]]) -> set[str]:
+    seen = {start}
+    todo = [start]
+    while todo:
+        for call in called[todo.pop()]:
+            if call.name not in seen:
+                seen.add(call.name)
+                todo.append(call.name)
+    return seen
+
+
+def _acting(templates: Mapping[str, md.Template]) -> set[str]:
+    """Names of the templates that contain an action, through others as well."""
+    acting: set[str] = set()
+    grown = True
+    while grown:
+        grown = False
+        for name, each in templates.items():
+            if name not in acting and any(
+                call.kind == "action" or call.name in acting for call in calls(each.body)
+            ):
+                acting.add(name)
+                grown = True
+    return acting
+
+
+def _acts(body: md.Body, acting: set[str]) -> bool:
+    return any(call.kind == "action" or call.name in acting for call in calls(body))
+
+
+def _check_skippers(report: Report, body: md.Body, acting: set[str]) -> None:
+    match body:
+        case md.BodyControl(kind, children):
+            if kind == "skipper":
+                for position, child in enumerate(children):
+                    # A foreach with actions becomes several children, so it may not be the last either.
+                    several = isinstance(child, md.BodyForeach)
+                    if (several or position < len(children) - 1) and _acts(child, acting):
+                        report.error(
+                            "BBT0216",
+                            "in a skipper only the last child may contain actions",
+                            child.span,
+                            "put the attempts into one last child: "
+                            "(skipper c (sequence (fallback attempt…) c))",
+                        )
+            for child in children:
+                _check_skippers(report, child, acting)
+        case md.BodyForeach(_, child):
+            _check_skippers(report, child, acting)
+        case md.BodyCall() | md.BodyCondition():
+            return
+        case _:
+            assert_never(body)

@@ -1,0 +1,183 @@
+"""First pass of name resolution: everything that sections declare."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeVar
+
+from bbtc.analysis.names import Declared, Names, Signature
+from bbtc.diagnostics import Related, Report
+from bbtc.model.domain import Function, Predicate
+from bbtc.model.types import OBJECT, Object, Type, TypeHierarchy
+from bbtc.syntax import ast
+
+S = TypeVar("S", bound=ast.Section)
+
+
+def sections(definition: ast.Definition, kind: type[S]) -> Iterator[S]:
+    """The sections of one kind, in source order."""
+    return (section for section in definition.sections if isinstance(section, kind))
+
+
+def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None) -> None:
+    """Fill ``names`` with the declarations of both definitions."""
+    names.hierarchy = _types(names, domain)
+    for definition in (domain, problem) if problem is not None else (domain,):
+        for section in sections(definition, ast.TypedSection):
+            if section.kind != "types":
+                _objects(names, section)
+    _predicates(names, domain)
+    _functions(names, domain)
+    _fluents(names, problem)
+    for action in sections(domain, ast.Action):
+        names.section = f"action {action.name.key}"
+        _sign(names, names.actions, "action", action)
+    for template in sections(domain, ast.Template):
+        names.section = f"template {template.name.key}"
+        _sign(names, names.templates, "template", template)
+        first = names.actions.get(template.name.key)
+        if first is not None:
+            twice(
+                names.report, "template", template.name, names.actions[template.name.key], other="an action"
+            )
+
+
+def twice(
+    report: Report, kind: str, name: ast.Term, first: Declared, *, other: str = "", harmless: bool = False
+) -> None:
+    """Report a name declared before; only a warning where both declarations say the same."""
+    clash = f"{kind} `{name.text}` " + (f"has the name of {other}" if other else "is declared twice")
+    add = report.warning if harmless else report.error
+    add("BBT0208", clash, name.span, related=[Related("first declared here", first.span)])
+
+
+# --- types -----------------------------------------------------------------------------------
+
+
+def _types(names: Names, domain: ast.Definition) -> TypeHierarchy:
+    found: dict[str, Type] = {}
+    parents: dict[str, dict[str, ast.Name]] = {}
+    for section in sections(domain, ast.TypedSection):
+        if section.kind == "types":
+            for group in section.entries:
+                for name in group.names:
+                    found.setdefault(name.key, Type(name.key, (), name.span))
+                    above = parents.setdefault(name.key, {})
+                    above.update((parent.key, parent) for parent in group.types if parent.key != name.key)
+    # A supertype need not be declared itself: `car - vehicle` is read as declaring both.
+    for above in list(parents.values()):
+        for key, parent in above.items():
+            found.setdefault(key, Type(key, (), parent.span))
+    found[OBJECT] = Type(OBJECT, (), found[OBJECT].span if OBJECT in found else None)
+    parents[OBJECT] = {}
+    _refuse_cycles(names, parents, found)
+    return TypeHierarchy(
+        {key: Type(key, tuple(parents.get(key, ())), type_.span) for key, type_ in found.items()}
+    )
+
+
+def _refuse_cycles(names: Names, parents: dict[str, dict[str, ast.Name]], found: dict[str, Type]) -> None:
+    """Report each cycle of supertypes once and cut it."""
+    done: set[str] = set()
+    for start in list(parents):
+        path: dict[str, Iterator[str]] = {}
+        todo = [] if start in done else [start]
+        while todo:
+            key = todo[-1]
+            if key not in path:
+                path[key] = iter(list(parents.get(key, ())))
+            step = next(path[key], None)
+            if step is None:
+                done.add(key)
+                del path[key]
+                todo.pop()
+            elif step in path:
+                round_trip = [*list(path)[list(path).index(step) :], step]
+                names.report.error(
+                    "BBT0209",
+                    f"type `{step}` is its own supertype: {' - '.join(round_trip)}",
+                    parents[key][step].span,
+                    related=[Related(f"`{step}` is declared here", found[step].span)],
+                )
+                del parents[key][step]
+            elif step not in done:
+                todo.append(step)
+
+
+# --- objects, predicates, functions -----------------------------------------------------------
+
+
+def _objects(names: Names, section: ast.TypedSection) -> None:
+    kind = "constant" if section.kind == "constants" else "object"
+    objects = names.objects
+    for group in section.entries:
+        types = names.types(group.types)
+        for name in group.names:
+            key = name.key
+            before = objects.get(key)
+            if before is None:
+                objects[key] = Object(key, types, name.span)
+            else:
+                twice(names.report, kind, name, before, harmless=before.types == types)
+
+
+def _predicates(names: Names, domain: ast.Definition) -> None:
+    names.section = "predicates"
+    derived = {rule.head.predicate.key for rule in sections(domain, ast.Derived)}
+    for section in sections(domain, ast.Predicates):
+        for node in section.declarations:
+            key = node.name.key
+            if key == "=":
+                # Some files declare equality; it is built in.
+                continue
+            predicate = Predicate(
+                key,
+                names.parameters(node.parameters),
+                declared_three_valued=node.three_valued,
+                derived=key in derived,
+                span=node.name.span,
+            )
+            before = names.predicates.setdefault(key, predicate)
+            if before is not predicate:
+                same = [p.types for p in before.parameters] == [p.types for p in predicate.parameters]
+                twice(names.report, "predicate", node.name, before, harmless=same)
+
+
+def _functions(names: Names, domain: ast.Definition) -> None:
+    names.section = "functions"
+    for section in sections(domain, ast.Functions):
+        for node in section.declarations:
+            if node.types and node.types[0].key != "number":
+                names.report.error(
+                    "BBT0212",
+                    f"the function `{node.name.text}` with values of type `{node.types[0].text}` "
+                    "is not supported",
+                    node.span,
+                    "functions have numbers as values; use a predicate for objects",
+                )
+            function = Function(node.name.key, names.parameters(node.parameters), node.name.span)
+            before = names.functions.setdefault(node.name.key, function)
+            if before is not function:
+                same = [p.types for p in before.parameters] == [p.types for p in function.parameters]
+                twice(names.report, "function", node.name, before, harmless=same)
+
+
+def _fluents(names: Names, problem: ast.Definition | None) -> None:
+    """The fluents that count cost and reward: ``total-cost`` and ``reward``, and the one a metric
+    minimises or maximises."""
+    costs, rewards = set(names.costs), set(names.rewards)
+    for metric in sections(problem, ast.Metric) if problem is not None else ():
+        if isinstance(metric.expression, ast.FluentRef) and not metric.expression.args:
+            key = metric.expression.name.key
+            if metric.direction == "minimize" and key not in rewards and key != "total-time":
+                costs.add(key)
+            elif metric.direction == "maximize" and key not in costs:
+                rewards.add(key)
+    names.costs, names.rewards = frozenset(costs), frozenset(rewards)
+
+
+def _sign(names: Names, into: dict[str, Signature], kind: str, node: ast.Action | ast.Template) -> None:
+    signature = Signature(node.name.key, names.parameters(node.parameters), node.name.span)
+    before = into.setdefault(node.name.key, signature)
+    if before is not signature:
+        twice(names.report, kind, node.name, before)

@@ -1,0 +1,235 @@
+"""Conditions and effects of the syntax tree, resolved."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from typing_extensions import assert_never
+
+from bbtc.analysis.names import Names, Scope
+from bbtc.diagnostics import Related
+from bbtc.model import effect as me
+from bbtc.model import formula as mf
+from bbtc.model.types import Parameter
+from bbtc.source import Span
+from bbtc.syntax import ast
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+ROUNDING = Fraction(1, 10**9)
+"""Probabilities whose sum differs from 1 by at most this are taken as rounded: each is divided
+by the sum. A smaller sum gets a no-change branch, a larger one is an error."""
+
+
+def inner_scope(names: Names, groups: ast.TypedList, scope: Scope) -> tuple[tuple[Parameter, ...], Scope]:
+    """Parameters of a quantifier, renamed (``?x``, ``?x'``, …) where they would shadow another."""
+    inside = dict(scope)
+    taken = {parameter.name for parameter in scope.values()}
+    result = []
+    for parameter in names.parameters(groups):
+        fresh = parameter.name
+        while fresh in taken:
+            fresh += "'"
+        taken.add(fresh)
+        renamed = Parameter(fresh, parameter.types, parameter.span)
+        inside[parameter.name] = renamed
+        result.append(renamed)
+    return tuple(result), inside
+
+
+def unsupported(names: Names, node: ast.Unsupported) -> None:
+    """Report a construct the language leaves out."""
+    names.report.error(
+        "BBT0212",
+        f"{node.construct} is not supported",
+        node.span,
+        "bbtc reads conditions over true, false and unknown facts, and costs and rewards as numbers",
+    )
+
+
+# --- conditions ------------------------------------------------------------------------------
+
+
+def atom(names: Names, node: ast.Atom, scope: Scope) -> mf.Atom | None:
+    """An atom, or None after an error."""
+    found = _predicate_args(names, node.predicate, node.args, node.span, scope)
+    return None if found is None else mf.Atom(node.predicate.key, found, node.span)
+
+
+def _predicate_args(
+    names: Names, name: ast.Name, args: Sequence[ast.Term], span: Span, scope: Scope
+) -> tuple[mf.Term, ...] | None:
+    predicate = names.predicates.get(name.key)
+    if predicate is None:
+        names.unknown("BBT0202", "predicate", name, names.predicates)
+        for arg in args:
+            names.term(arg, scope)
+        return None
+    return names.arguments("predicate", name, predicate, args, scope, span=span)
+
+
+def formula(names: Names, node: ast.Formula, scope: Scope) -> mf.Formula:
+    """A condition; parts with errors, which are reported, count as true."""
+    match node:
+        case ast.Atom():
+            return atom(names, node, scope) or mf.ALWAYS
+        case ast.Empty():
+            return mf.ALWAYS
+        case ast.Equality(left, right, span):
+            first, second = names.term(left, scope), names.term(right, scope)
+            return mf.Equal(first[0], second[0], span) if first and second else mf.ALWAYS
+        case ast.Not(part, span):
+            return mf.Not(formula(names, part, scope), span)
+        case ast.And(parts, span):
+            return mf.And(tuple(formula(names, p, scope) for p in parts), span)
+        case ast.Or(parts, span):
+            return mf.Or(tuple(formula(names, p, scope) for p in parts), span)
+        case ast.Imply(premise, conclusion, span):
+            # In strong Kleene logic a implies b is (or (not a) b).
+            negated = mf.Not(formula(names, premise, scope), premise.span)
+            return mf.Or((negated, formula(names, conclusion, scope)), span)
+        case ast.Quantified(kind, groups, part, span):
+            parameters, inside = inner_scope(names, groups, scope)
+            return mf.Quantified(kind, parameters, formula(names, part, inside), span)
+        case ast.Test(kind, tested, span):
+            found = atom(names, tested, scope)
+            return mf.ALWAYS if found is None else mf.Test(kind, found, span)
+        case ast.Unsupported():
+            unsupported(names, node)
+            return mf.ALWAYS
+        case _:
+            assert_never(node)
+
+
+# --- effects ---------------------------------------------------------------------------------
+
+
+def effect(names: Names, node: ast.Effect, scope: Scope) -> me.Effect:
+    """An effect; parts with errors, which are reported, count as no change."""
+    match node:
+        case ast.Empty():
+            return me.NOTHING
+        case ast.Assign(target, value, span):
+            args = _predicate_args(names, target.predicate, target.args, target.span, scope)
+            if args is None or _is_derived(names, target):
+                return me.NOTHING
+            return me.Set(target.predicate.key, args, value, span)
+        case ast.EffectAnd(parts, span):
+            return me.Together(tuple(effect(names, p, scope) for p in parts), span)
+        case ast.When(condition, inner, span):
+            return me.When(formula(names, condition, scope), effect(names, inner, scope), span)
+        case ast.EffectForall(groups, inner, span):
+            parameters, inside = inner_scope(names, groups, scope)
+            return me.ForEach(parameters, effect(names, inner, inside), span)
+        case ast.Probabilistic():
+            return probabilistic(names, node, scope)
+        case ast.OneOf(parts, span):
+            if not parts:
+                return me.NOTHING
+            share = Fraction(1, len(parts))
+            branches = tuple(me.Branch(share, effect(names, p, scope), p.span) for p in parts)
+            return me.Choice(branches, True, span)
+        case ast.FluentEffect():
+            return _fluent_effect(names, node, scope)
+        case ast.Unsupported():
+            unsupported(names, node)
+            return me.NOTHING
+        case _:
+            assert_never(node)
+
+
+def _is_derived(names: Names, target: ast.Atom) -> bool:
+    predicate = names.predicates[target.predicate.key]
+    if predicate.derived:
+        names.report.error(
+            "BBT0219",
+            f"the derived predicate `{target.predicate.text}` cannot be set",
+            target.span,
+            "its rules alone say when it holds",
+            [Related("declared here", predicate.span)],
+        )
+    return predicate.derived
+
+
+def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Choice:
+    """A draw with probabilities that sum to 1 (see :data:`ROUNDING`)."""
+    drawn: list[tuple[Fraction, me.Effect, ast.Branch]] = []
+    faulty = False
+    for branch in node.branches:
+        value = names.number(branch.probability)
+        if value is not None and not 0 <= value <= 1:
+            names.report.error(
+                "BBT0210",
+                f"probability {branch.probability.text} is outside [0, 1]",
+                branch.probability.span,
+            )
+            value = None
+        faulty = faulty or value is None
+        drawn.append((value or Fraction(0), effect(names, branch.effect, scope), branch))
+    total = sum((value for value, _, _ in drawn), Fraction(0))
+    if faulty:
+        total = Fraction(1)
+    elif total > 1 + ROUNDING:
+        names.report.error(
+            "BBT0211",
+            f"the probabilities sum to {_decimal(total)}, above 1",
+            node.span,
+            "what is missing to 1 means no change; it cannot be more than 1",
+        )
+        total = Fraction(1)
+    scale = total if abs(total - 1) <= ROUNDING else Fraction(1)
+    branches = [me.Branch(value / scale, part, branch.span) for value, part, branch in drawn]
+    if total / scale < 1:
+        branches.append(me.Branch(1 - total, me.NOTHING, node.span))
+    return me.Choice(tuple(branches), False, node.span)
+
+
+def _decimal(value: Fraction) -> str:
+    return f"{float(value):.12g}"
+
+
+def _fluent_effect(names: Names, node: ast.FluentEffect, scope: Scope) -> me.Effect:
+    key = node.fluent.name.key
+    to = "cost" if key in names.costs else "reward" if key in names.rewards else None
+    if to is None or node.fluent.args or node.operator not in ("increase", "decrease"):
+        names.report.error(
+            "BBT0212",
+            f"the numeric effect `{node.operator} {node.fluent.name.text}` is not supported",
+            node.span,
+            "numbers are read as costs and rewards: `increase` or `decrease` of the fluent that the "
+            "metric names, `total-cost` or `reward`",
+        )
+        return me.NOTHING
+    found = amount(names, node.amount, scope)
+    if found is None:
+        return me.NOTHING
+    sign = 1 if node.operator == "increase" else -1
+    return me.Add("cost" if to == "cost" else "reward", found, sign, node.span)
+
+
+def amount(names: Names, node: ast.NumericExpression, scope: Scope) -> me.Amount | None:
+    """A numeric expression over static functions, or None after an error."""
+    match node:
+        case ast.Number():
+            value = names.number(node)
+            return None if value is None else me.Constant(value)
+        case ast.FluentRef(name, args, span):
+            function = names.functions.get(name.key)
+            if function is None:
+                names.unknown("BBT0220", "function", name, names.functions)
+                return None
+            if name.key in names.costs or name.key in names.rewards:
+                names.report.error(
+                    "BBT0212", f"reading the numeric fluent `{name.text}` is not supported", span
+                )
+                return None
+            found = names.arguments("function", name, function, args, scope, span=span)
+            return None if found is None else me.FunctionValue(name.key, found, span)
+        case ast.Arithmetic(operator, operands, span):
+            parts = [amount(names, operand, scope) for operand in operands]
+            known = tuple(part for part in parts if part is not None)
+            return me.Arithmetic(operator, known, span) if len(known) == len(parts) else None
+        case _:
+            assert_never(node)

@@ -1,0 +1,374 @@
+"""From syntax trees to the model: every name bound once, all errors reported."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+
+from typing_extensions import assert_never
+
+from bbtc.analysis import bodies, formulas
+from bbtc.analysis.declare import declare, sections
+from bbtc.analysis.initial import initial
+from bbtc.analysis.names import Names
+from bbtc.diagnostics import Related, Report
+from bbtc.kleene import Truth
+from bbtc.model import domain as md
+from bbtc.model import effect as me
+from bbtc.model import formula as mf
+from bbtc.model.types import Parameter
+from bbtc.source import Span
+from bbtc.syntax import ast
+
+_PROBLEM_ONLY = (ast.Init, ast.Goal, ast.GoalNumber, ast.Metric, ast.DomainReference, ast.Hidden)
+_DOMAIN_ONLY = (ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template)
+
+
+def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Report) -> md.Model | None:
+    """The model of a domain, with a problem or alone (to check it).
+
+    Errors go to ``report``, all of them; the result is None if it holds any. Probabilities whose
+    sum differs from 1 by at most 1e-9 are taken as rounded and divided by their sum; a smaller sum
+    gets an explicit no-change branch.
+    """
+    names = Names(report)
+    _check_sections(report, domain, problem)
+    declare(names, domain, problem)
+    schemas: dict[str, md.Schema] = {}
+    for action in sections(domain, ast.Action):
+        names.section = f"action {action.name.key}"
+        schemas.setdefault(action.name.key, _schema(names, action))
+    rules = tuple(_rule(names, node) for node in sections(domain, ast.Derived))
+    _check_stratified(names, rules)
+    sensors = tuple(_sensor(names, node) for node in sections(domain, ast.Sensor))
+    templates: dict[str, md.Template] = {}
+    for node in sections(domain, ast.Template):
+        names.section = f"template {node.name.key}"
+        templates.setdefault(node.name.key, bodies.template(names, node))
+    bodies.check_templates(report, templates)
+    requirements = tuple(key.key for section in sections(domain, ast.Requirements) for key in section.keys)
+    model = md.Model(
+        domain=domain.name.key,
+        problem=None,
+        types=names.hierarchy,
+        objects=names.objects,
+        predicates=names.predicates,
+        functions=names.functions,
+        schemas=schemas,
+        rules=rules,
+        sensors=sensors,
+        templates=templates,
+        init=md.Init(),
+        goal=None,
+        counts_cost=_counts_cost(names, schemas),
+        requirements=requirements,
+        span=domain.name.span,
+    )
+    if problem is not None:
+        model = _with_problem(names, model, domain, problem)
+    model = replace(model, predicates=_three_valued(names, model, problem is not None))
+    return None if report.errors else model
+
+
+def _check_sections(report: Report, domain: ast.Definition, problem: ast.Definition | None) -> None:
+    """Refuse constructs by name, sections in the wrong definition, and second goals."""
+    for definition in (domain, problem) if problem is not None else (domain,):
+        wrong = _PROBLEM_ONLY if definition.kind == "domain" else _DOMAIN_ONLY
+        other = "problem" if definition.kind == "domain" else "domain"
+        seen: dict[str, ast.Section] = {}
+        for section in definition.sections:
+            if isinstance(section, ast.Unsupported):
+                report.error("BBT0212", f"{section.construct} is not supported", section.span)
+            elif isinstance(section, wrong) or (
+                isinstance(section, ast.TypedSection) and section.kind == "types" and other == "domain"
+            ):
+                report.error("BBT0221", f"this section belongs in a {other}", section.span)
+            elif isinstance(section, (ast.Goal, ast.GoalNumber, ast.Metric, ast.Init, ast.DomainReference)):
+                kind = section.kind if isinstance(section, ast.GoalNumber) else _section_name(section)
+                if kind in seen:
+                    report.error(
+                        "BBT0208",
+                        f"`:{kind}` is given twice",
+                        section.span,
+                        related=[Related("first given here", seen[kind].span)],
+                    )
+                seen.setdefault(kind, section)
+
+
+def _section_name(section: ast.Goal | ast.Metric | ast.Init | ast.DomainReference) -> str:
+    return "domain" if isinstance(section, ast.DomainReference) else type(section).__name__.lower()
+
+
+# --- the domain ------------------------------------------------------------------------------
+
+
+def _scope(parameters: tuple[Parameter, ...]) -> dict[str, Parameter]:
+    return {parameter.name: parameter for parameter in parameters}
+
+
+def _schema(names: Names, node: ast.Action) -> md.Schema:
+    parameters = names.actions[node.name.key].parameters
+    scope = _scope(parameters)
+    observe: mf.Formula | me.Choice | None = None
+    if node.observe is not None:
+        content = node.observe.content
+        if isinstance(content, ast.Probabilistic):
+            observe = formulas.probabilistic(names, content, scope)
+        else:
+            observe = formulas.formula(names, content, scope)
+    return md.Schema(
+        node.name.key,
+        parameters,
+        mf.ALWAYS if node.precondition is None else formulas.formula(names, node.precondition, scope),
+        me.NOTHING if node.effect is None else formulas.effect(names, node.effect, scope),
+        observe,
+        None if node.observe is None else node.observe.span,
+        node.span,
+    )
+
+
+def _rule(names: Names, node: ast.Derived) -> md.Rule:
+    names.section = f"derived {node.head.predicate.key}"
+    # The head's own types bind: parameters of the head are often written without any.
+    predicate = names.predicates.get(node.head.predicate.key)
+    declared = (
+        {}
+        if predicate is None
+        else {
+            arg.key: parameter.types
+            for arg, parameter in zip(node.head.args, predicate.parameters, strict=False)
+            if isinstance(arg, ast.Variable)
+        }
+    )
+    parameters = names.parameters(node.parameters)
+    known = {parameter.name for parameter in parameters}
+    untyped = {name.key for group in node.parameters if not group.types for name in group.names}
+    parameters = tuple(
+        replace(p, types=declared.get(p.name, p.types)) if p.name in untyped else p for p in parameters
+    ) + tuple(
+        Parameter(arg.key, declared[arg.key], arg.span)
+        for arg in dict.fromkeys(node.head.args)
+        if isinstance(arg, ast.Variable) and arg.key not in known and arg.key in declared
+    )
+    scope = _scope(parameters)
+    head = formulas.atom(names, node.head, scope)
+    condition = formulas.formula(names, node.condition, scope)
+    args = () if head is None else head.args
+    return md.Rule(node.head.predicate.key, args, parameters, condition, node.span)
+
+
+def _check_stratified(names: Names, rules: tuple[md.Rule, ...]) -> None:
+    """A derived predicate may depend on itself, but not on its own negation (or a test of it)."""
+    reads: dict[str, dict[str, bool]] = {}
+    for rule in rules:
+        for predicate, negative in _signed(rule.condition, False):
+            below = reads.setdefault(rule.predicate, {})
+            below[predicate] = below.get(predicate, False) or negative
+    told: set[str] = set()
+    for rule in rules:
+        for predicate, negative in reads.get(rule.predicate, {}).items():
+            if negative and rule.predicate not in told and rule.predicate in _below(predicate, reads):
+                told.add(rule.predicate)
+                names.report.error(
+                    "BBT0222",
+                    f"the derived predicate `{rule.predicate}` depends on its own negation",
+                    rule.span,
+                    f"the negative condition is on `{predicate}`",
+                )
+
+
+def _below(start: str, reads: dict[str, dict[str, bool]]) -> set[str]:
+    seen, todo = {start}, [start]
+    while todo:
+        for predicate in reads.get(todo.pop(), {}):
+            if predicate not in seen:
+                seen.add(predicate)
+                todo.append(predicate)
+    return seen
+
+
+def _signed(formula: mf.Formula, negative: bool) -> Iterator[tuple[str, bool]]:
+    match formula:
+        case mf.Atom(predicate):
+            yield predicate, negative
+        case mf.Test(_, atom):
+            yield atom.predicate, True
+        case mf.Equal():
+            return
+        case mf.Not(part):
+            yield from _signed(part, not negative)
+        case mf.And(parts) | mf.Or(parts):
+            for part in parts:
+                yield from _signed(part, negative)
+        case mf.Quantified(_, _, part):
+            yield from _signed(part, negative)
+        case _:
+            assert_never(formula)
+
+
+def _sensor(names: Names, node: ast.Sensor) -> md.Sensor:
+    names.section = f"sensor {node.name.key}"
+    parameters = names.parameters(node.parameters)
+    scope = _scope(parameters)
+    condition = mf.ALWAYS if node.condition is None else formulas.formula(names, node.condition, scope)
+    sensed = formulas.formula(names, node.sensed, scope)
+    return md.Sensor(node.name.key, parameters, condition, sensed, node.span)
+
+
+def _counts_cost(names: Names, schemas: dict[str, md.Schema]) -> bool:
+    if not names.costs.isdisjoint(names.functions):
+        return True
+    added = (leaf for schema in schemas.values() for leaf in me.leaves(schema.effect))
+    return any(isinstance(leaf, me.Add) and leaf.to == "cost" for leaf in added)
+
+
+def _three_valued(names: Names, model: md.Model, complete: bool) -> dict[str, md.Predicate]:
+    """Mark the predicates that something makes unknown, derived ones through what they read."""
+    unknown: dict[str, None] = {}
+    effects = [schema.effect for schema in model.schemas.values()] + list(model.init.choices)
+    for effect in effects:
+        for leaf in me.leaves(effect):
+            if isinstance(leaf, me.Set) and leaf.value is Truth.UNKNOWN:
+                unknown[leaf.predicate] = None
+    unknown.update((fact.predicate, None) for fact in model.init.facts if fact.value is Truth.UNKNOWN)
+    grown = True
+    while grown:
+        grown = False
+        for rule in model.rules:
+            if rule.predicate not in unknown and any(
+                predicate in unknown for predicate in _plain(rule.condition)
+            ):
+                unknown[rule.predicate] = None
+                grown = True
+    if complete:
+        for key, predicate in model.predicates.items():
+            if predicate.declared_three_valued and key not in unknown:
+                names.report.warning(
+                    "BBT0218",
+                    f"`{key}` is declared three-valued, but nothing makes it unknown",
+                    predicate.span,
+                    f"no `(unknown ({key} …))` stands in an effect or in `:init`",
+                )
+    return {
+        key: replace(predicate, three_valued=key in unknown or predicate.declared_three_valued)
+        for key, predicate in model.predicates.items()
+    }
+
+
+def _plain(formula: mf.Formula) -> Iterator[str]:
+    """Predicates whose unknown value makes the formula unknown: all but those in tests."""
+    match formula:
+        case mf.Atom(predicate):
+            yield predicate
+        case mf.Test() | mf.Equal():
+            return
+        case mf.Not(part) | mf.Quantified(_, _, part):
+            yield from _plain(part)
+        case mf.And(parts) | mf.Or(parts):
+            for part in parts:
+                yield from _plain(part)
+        case _:
+            assert_never(formula)
+
+
+# --- the problem -----------------------------------------------------------------------------
+
+
+def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem: ast.Definition) -> md.Model:
+    report = names.report
+    for reference in sections(problem, ast.DomainReference):
+        if reference.name.key != domain.name.key:
+            report.warning(
+                "BBT0217",
+                f"the problem is for domain `{reference.name.text}`, not `{domain.name.text}`",
+                reference.name.span,
+                related=[Related("the domain given with it", domain.name.span)],
+            )
+    names.section = "init"
+    init = initial(names, list(sections(problem, ast.Init)))
+    for hidden in sections(problem, ast.Hidden):
+        for fact in hidden.facts:
+            formulas.atom(names, fact.atom, {})
+    goal, goal_span = _goal(names, model, problem)
+    probability, reward = Fraction(1), Fraction(0)
+    for number in sections(problem, ast.GoalNumber):
+        value = names.number(number.value)
+        if value is None:
+            continue
+        if number.kind == "goal-reward":
+            reward = value
+        elif not 0 < value <= 1:
+            report.error(
+                "BBT0214",
+                f"the goal probability {number.value.text} is outside (0, 1]",
+                number.value.span,
+            )
+        else:
+            probability = value
+    metric = next(sections(problem, ast.Metric), None)
+    maximise = metric is not None and metric.direction == "maximize"
+    if metric is not None:
+        _check_metric(names, metric)
+    return replace(
+        model,
+        problem=problem.name.key,
+        init=init,
+        goal=goal,
+        goal_span=goal_span,
+        goal_probability=probability,
+        goal_reward=reward,
+        metric="reward" if maximise else "cost",
+        problem_span=problem.name.span,
+    )
+
+
+def _goal(names: Names, model: md.Model, problem: ast.Definition) -> tuple[mf.Formula | None, Span | None]:
+    names.section = "goal"
+    goal = next(sections(problem, ast.Goal), None)
+    if goal is not None:
+        return _goal_formula(names, model, goal.formula), goal.formula.span
+    if next(sections(problem, ast.Metric), None) is None and not any(
+        isinstance(section, ast.Unsupported) for section in problem.sections
+    ):
+        names.report.error("BBT0213", f"problem `{problem.name.text}` has no `:goal`", problem.name.span)
+    return None, None
+
+
+def _goal_formula(names: Names, model: md.Model, node: ast.Formula) -> mf.Formula:
+    """The goal; ``(action name args…)`` in it stands for the preconditions of that action."""
+    if isinstance(node, ast.And):
+        return mf.And(tuple(_goal_formula(names, model, part) for part in node.parts), node.span)
+    if isinstance(node, ast.Atom) and node.predicate.key == "action" and "action" not in names.predicates:
+        if not node.args:
+            names.report.error("BBT0206", "`action` in a goal needs the name of an action", node.span)
+            return mf.ALWAYS
+        name, args = node.args[0], node.args[1:]
+        signature = names.actions.get(name.key)
+        if signature is None or name.key not in model.schemas:
+            names.unknown("BBT0205", "action", name, names.actions)
+            return mf.ALWAYS
+        found = names.arguments("action", ast.Name(name.text, name.span), signature, args, {}, span=node.span)
+        if found is None:
+            return mf.ALWAYS
+        binding = {p.name: arg for p, arg in zip(signature.parameters, found, strict=True)}
+        return mf.substitute(model.schemas[name.key].precondition, binding)
+    return formulas.formula(names, node, {})
+
+
+def _check_metric(names: Names, metric: ast.Metric) -> None:
+    expression = metric.expression
+    if isinstance(expression, ast.FluentRef) and not expression.args:
+        key = expression.name.key
+        if key in names.costs or key in names.rewards:
+            if key not in names.functions and key not in ("total-cost", "reward"):
+                names.unknown("BBT0220", "function", expression.name, names.functions)
+            return
+        if key in ("total-time", "goal-probability", "goal-achieved"):
+            return
+    names.report.error(
+        "BBT0212",
+        "this metric is not supported",
+        metric.span,
+        "a metric names one fluent: `(:metric minimize (total-cost))`, `(:metric maximize (reward))`",
+    )

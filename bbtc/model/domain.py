@@ -1,0 +1,192 @@
+"""The model of a domain with a problem: what :func:`bbtc.analysis.resolve.resolve` returns.
+
+Frozen; names are keys (lower case) and all of them are declared. Every declaration keeps its span.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal, TypeAlias
+
+from bbtc.kleene import Truth
+from bbtc.model.effect import Choice, Effect
+from bbtc.model.formula import Formula, Term
+from bbtc.model.types import Object, Parameter, TypeHierarchy
+from bbtc.source import Span
+
+
+@dataclass(frozen=True, slots=True)
+class Predicate:
+    """A predicate. ``three_valued`` if anything in the model can make it unknown."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    three_valued: bool = False
+    declared_three_valued: bool = False
+    derived: bool = False
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A numeric function that ``:init`` gives values to."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """An action. ``observe`` is what ``:observe`` shows: a condition, or a noisy draw."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    precondition: Formula
+    effect: Effect
+    observe: Formula | Choice | None = None
+    observe_span: Span | None = field(default=None, compare=False, repr=False)
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """What becomes known by itself whenever the condition holds."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    condition: Formula
+    sensed: Formula
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A derived predicate: it has the value of the condition (least fixpoint where recursive).
+    Several rules for one predicate are a disjunction."""
+
+    predicate: str
+    args: tuple[Term, ...]
+    parameters: tuple[Parameter, ...]
+    condition: Formula
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+# --- templates -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class BodyControl:
+    """A control node of a template body."""
+
+    kind: Literal["sequence", "fallback", "skipper"]
+    children: tuple[Body, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyCondition:
+    """A condition of a template body."""
+
+    condition: Formula
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyCall:
+    """A call of an action or of another template."""
+
+    kind: Literal["action", "template"]
+    name: str
+    args: tuple[Term, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyForeach:
+    """The child once for every binding, as children of the parent."""
+
+    parameters: tuple[Parameter, ...]
+    child: Body
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+Body: TypeAlias = BodyControl | BodyCondition | BodyCall | BodyForeach
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A named subtree; precondition and effect only guide the planner (effect None: no guide)."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    precondition: Formula
+    effect: Effect | None
+    body: Body
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+# --- the problem -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class InitialFact:
+    """The value of a ground atom at the start. What no fact mentions is false."""
+
+    predicate: str
+    args: tuple[str, ...]
+    value: Truth
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class InitialClause:
+    """``(or …)`` and the like in ``:init``: it is known to hold at the start, and in every
+    reachable state if it is an ``invariant``."""
+
+    condition: Formula
+    invariant: bool = False
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Init:
+    """The start: certain facts, numbers, draws (``probabilistic`` and ``oneof``) and clauses."""
+
+    facts: tuple[InitialFact, ...] = ()
+    numbers: Mapping[tuple[str, tuple[str, ...]], Fraction] = field(default_factory=dict)
+    choices: tuple[Effect, ...] = ()
+    clauses: tuple[InitialClause, ...] = ()
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """A domain and, unless ``problem`` is None, a problem. Mappings are in source order.
+
+    ``counts_cost``: the domain has a cost fluent, so an action costs what it adds to it;
+    otherwise every action costs 1. ``goal`` is None where the problem states none.
+    """
+
+    domain: str
+    problem: str | None
+    types: TypeHierarchy
+    objects: Mapping[str, Object]
+    predicates: Mapping[str, Predicate]
+    functions: Mapping[str, Function]
+    schemas: Mapping[str, Schema]
+    rules: tuple[Rule, ...]
+    sensors: tuple[Sensor, ...]
+    templates: Mapping[str, Template]
+    init: Init
+    goal: Formula | None
+    goal_probability: Fraction = Fraction(1)
+    goal_reward: Fraction = Fraction(0)
+    metric: Literal["cost", "reward"] = "cost"
+    counts_cost: bool = False
+    requirements: tuple[str, ...] = ()
+    goal_span: Span | None = field(default=None, compare=False, repr=False)
+    span: Span | None = field(default=None, compare=False, repr=False)
+    problem_span: Span | None = field(default=None, compare=False, repr=False)

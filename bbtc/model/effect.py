@@ -1,0 +1,149 @@
+"""Lifted effects, as written: ``when``, ``forall`` and chance nest freely."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal, TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.kleene import Truth
+from bbtc.model.formula import Formula, Term
+from bbtc.model.types import Parameter
+from bbtc.source import Span
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """Makes an atom true, false or unknown."""
+
+    predicate: str
+    args: tuple[Term, ...]
+    value: Truth
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """All parts at once; without parts, no change."""
+
+    parts: tuple[Effect, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """The effect, if the condition is true in the state before the action."""
+
+    condition: Formula
+    effect: Effect
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class ForEach:
+    """The effect for every binding of the parameters; chance inside is drawn for each of them."""
+
+    parameters: tuple[Parameter, ...]
+    effect: Effect
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """One thing that may happen, with its probability."""
+
+    probability: Fraction
+    effect: Effect
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Exactly one branch happens; probabilities sum to 1. ``oneof`` marks branches whose
+    probabilities are not known and count as equal."""
+
+    branches: tuple[Branch, ...]
+    oneof: bool = False
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A number."""
+
+    value: Fraction
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionValue:
+    """A number given in ``:init`` that no action changes, e.g. ``(distance ?a ?b)``."""
+
+    function: str
+    args: tuple[Term, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic:
+    """``+ - * /`` over amounts."""
+
+    operator: str
+    operands: tuple[Amount, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+Amount: TypeAlias = Constant | FunctionValue | Arithmetic
+
+
+@dataclass(frozen=True, slots=True)
+class Add:
+    """Adds to the cost or the reward; ``sign`` is -1 for a decrease."""
+
+    to: Literal["cost", "reward"]
+    amount: Amount
+    sign: int = 1
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+Effect: TypeAlias = Set | Together | When | ForEach | Choice | Add
+NOTHING = Together(())
+
+
+def leaves(effect: Effect) -> Iterator[Set | Add]:
+    """Everything the effect may do, from left to right."""
+    match effect:
+        case Set() | Add():
+            yield effect
+        case Together(parts):
+            for part in parts:
+                yield from leaves(part)
+        case When(_, inner) | ForEach(_, inner):
+            yield from leaves(inner)
+        case Choice(branches):
+            for branch in branches:
+                yield from leaves(branch.effect)
+        case _:
+            assert_never(effect)
+
+
+def conditions(effect: Effect) -> Iterator[Formula]:
+    """The conditions of every ``when`` in the effect."""
+    match effect:
+        case Set() | Add():
+            return
+        case Together(parts):
+            for part in parts:
+                yield from conditions(part)
+        case When(condition, inner):
+            yield condition
+            yield from conditions(inner)
+        case ForEach(_, inner):
+            yield from conditions(inner)
+        case Choice(branches):
+            for branch in branches:
+                yield from conditions(branch.effect)
+        case _:
+            assert_never(effect)

@@ -1,0 +1,137 @@
+"""Lifted conditions. A term is a string: ``?x`` is a parameter, anything else an object.
+
+Parameters of quantifiers never shadow another parameter in scope: :mod:`bbtc.analysis.resolve`
+renames them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.model.types import Parameter
+from bbtc.source import Span
+
+Term: TypeAlias = str
+
+
+def is_parameter(term: Term) -> bool:
+    """Whether the term is a parameter."""
+    return term[0] == "?"
+
+
+@dataclass(frozen=True, slots=True)
+class Atom:
+    """The value of a predicate for its arguments."""
+
+    predicate: str
+    args: tuple[Term, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """The two-valued tests ``(unknown p)`` and ``(known p)``."""
+
+    kind: Literal["unknown", "known"]
+    atom: Atom
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Equal:
+    """Both terms are the same object."""
+
+    left: Term
+    right: Term
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """Kleene negation."""
+
+    part: Formula
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class And:
+    """Kleene conjunction; without parts, true."""
+
+    parts: tuple[Formula, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Or:
+    """Kleene disjunction; without parts, false."""
+
+    parts: tuple[Formula, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantified:
+    """``exists``: the disjunction, ``forall``: the conjunction over all bindings."""
+
+    kind: Literal["exists", "forall"]
+    parameters: tuple[Parameter, ...]
+    part: Formula
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+Formula: TypeAlias = Atom | Test | Equal | Not | And | Or | Quantified
+ALWAYS = And(())
+NEVER = Or(())
+
+
+def conjoin(first: Formula | None, second: Formula | None) -> Formula | None:
+    """The conjunction of two optional conditions (None: no condition)."""
+    if first is None or second is None:
+        return second if first is None else first
+    return And((first, second))
+
+
+def atoms(formula: Formula) -> Iterator[Atom]:
+    """The atoms a formula reads, tests included, from left to right."""
+    match formula:
+        case Atom():
+            yield formula
+        case Test(_, atom):
+            yield atom
+        case Equal():
+            return
+        case Not(part) | Quantified(_, _, part):
+            yield from atoms(part)
+        case And(parts) | Or(parts):
+            for each in parts:
+                yield from atoms(each)
+        case _:
+            assert_never(formula)
+
+
+def substitute(formula: Formula, binding: dict[str, Term]) -> Formula:
+    """The formula with free parameters replaced. The new terms must not be captured by
+    quantifiers inside (objects never are)."""
+    match formula:
+        case Atom(predicate, args, span):
+            return Atom(predicate, tuple(binding.get(a, a) for a in args), span)
+        case Test(kind, atom, span):
+            args = tuple(binding.get(a, a) for a in atom.args)
+            return Test(kind, Atom(atom.predicate, args, atom.span), span)
+        case Equal(left, right, span):
+            return Equal(binding.get(left, left), binding.get(right, right), span)
+        case Not(part, span):
+            return Not(substitute(part, binding), span)
+        case And(parts, span):
+            return And(tuple(substitute(p, binding) for p in parts), span)
+        case Or(parts, span):
+            return Or(tuple(substitute(p, binding) for p in parts), span)
+        case Quantified(kind, parameters, part, span):
+            return Quantified(kind, parameters, substitute(part, binding), span)
+        case _:
+            assert_never(formula)

@@ -1,0 +1,82 @@
+"""Types: a hierarchy under ``object``, parameters and objects with their types.
+
+All names are keys (lower case); the text as written is reached through the spans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from bbtc.source import Span
+
+OBJECT = "object"
+
+
+@dataclass(frozen=True, slots=True)
+class Type:
+    """A type and its direct supertypes (several for ``(either …)`` or repeated declarations)."""
+
+    name: str
+    parents: tuple[str, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A variable, question mark included, and its types: it takes an object of any of them."""
+
+    name: str
+    types: tuple[str, ...] = (OBJECT,)
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Object:
+    """A constant of the domain or an object of the problem, and its types."""
+
+    name: str
+    types: tuple[str, ...] = (OBJECT,)
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class TypeHierarchy:
+    """The declared types, ``object`` included. Raises ``KeyError`` for names not declared."""
+
+    types: Mapping[str, Type]
+
+    @cached_property
+    def ancestors(self) -> Mapping[str, frozenset[str]]:
+        """Every type a type is a subtype of, itself and ``object`` included."""
+        known: dict[str, frozenset[str]] = {}
+        for name in self.types:
+            # Depth first without recursion: a hierarchy may be deeper than the Python stack.
+            seen = {name, OBJECT}
+            todo = [name]
+            while todo:
+                for parent in self.types[todo.pop()].parents:
+                    if parent not in seen:
+                        if parent in known:
+                            seen |= known[parent]
+                        else:
+                            seen.add(parent)
+                            todo.append(parent)
+            known[name] = frozenset(seen)
+        return known
+
+    def is_subtype(self, name: str, of: Iterable[str]) -> bool:
+        """Whether every object of the type is of one of the other types."""
+        return not self.ancestors[name].isdisjoint(of)
+
+    def fits(self, given: Iterable[str], wanted: Iterable[str]) -> bool:
+        """Whether every object of ``given`` (one of its types each) is of one of ``wanted``."""
+        wanted = tuple(wanted)
+        return all(self.is_subtype(name, wanted) for name in given)
+
+    def overlaps(self, given: Iterable[str], wanted: Iterable[str]) -> bool:
+        """Whether some object could be of both, as far as the declarations tell: one type is
+        a subtype of the other, or they have a declared subtype in common."""
+        first, second = tuple(given), tuple(wanted)
+        return any(self.is_subtype(name, first) and self.is_subtype(name, second) for name in self.types)
