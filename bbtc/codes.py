@@ -48,7 +48,9 @@ CODES: dict[str, str] = {
     "BBT0223": "initial fact with two values",
     # 03xx: checks
     # 04xx: grounding
-    # 05xx: planning and trees
+    # 05xx: planning
+    "BBT0501": "unknown strategy",
+    "BBT0502": "nothing left to insert before the target",
     # 06xx: artefacts, and the shape of trees
     "BBT0601": "artefact is not valid JSON",
     "BBT0602": "artefact of another format or version",
@@ -67,4 +69,5 @@ CODES: dict[str, str] = {
     "BBT0702": "two exporters claim one format",
     "BBT0703": "exporter cannot be loaded",
     "BBT0704": "wrong export option",
+    "BBT0705": "tree too deep for the engine",
 }

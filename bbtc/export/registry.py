@@ -1,7 +1,8 @@
 """The exporters: their protocol, the built-in ones, and plugins.
 
-A built-in is named in :data:`BUILT_INS` and imported when it is used. Another package adds a format by an entry
-point of the group ``bbtc.exporters`` that loads an object of the protocol :class:`Exporter`.
+A built-in is named in :data:`BUILT_INS` and imported when it is used. Another package adds a format
+by an entry point of the group ``bbtc.exporters`` that loads an object of the protocol
+:class:`Exporter`.
 """
 
 from __future__ import annotations

@@ -1,0 +1,146 @@
+"""Trees and conditions in a shape that an execution engine can take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from typing_extensions import assert_never
+
+from bbtc.diagnostics import BbtcError
+from bbtc.ground.condition import (
+    FALSE,
+    TRUE,
+    And,
+    Condition,
+    Constant,
+    Is,
+    Known,
+    Not,
+    Or,
+    conjunction,
+    disjunction,
+    negation,
+)
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+
+DEEPEST_TREE = 250
+"""Levels of nodes an exported tree may have: BehaviorTree.CPP reads 256 levels of XML, and py_trees
+needs a Python frame or two a level."""
+
+DEEPEST_CONDITION = 50
+"""Levels of ``and``, ``or`` and ``not`` an exported condition may have."""
+
+
+def fit(root: Node, engine: str) -> Node:
+    """The tree itself, or, if it is too deep, an equivalent one in which no control node stands
+    directly in another of its kind. Raises :class:`BbtcError` if that is too deep as well, or if
+    a condition is."""
+    if tree_depth(root) > DEEPEST_TREE:
+        root = _merged(root)
+        levels = tree_depth(root)
+        if levels > DEEPEST_TREE:
+            raise BbtcError.single(
+                "BBT0705",
+                f"the tree has {levels} levels; {engine} takes at most {DEEPEST_TREE}",
+                hint="plan with a lower target or with templates of their own for parts of the task",
+            )
+    return root
+
+
+def tree_depth(root: Node) -> int:
+    """The number of levels of a tree. Iterative: any tree can be measured."""
+    deepest, stack = 0, [(root, 1)]
+    while stack:
+        node, level = stack.pop()
+        deepest = max(deepest, level)
+        if isinstance(node, ControlNode):
+            stack.extend((child, level + 1) for child in node.children)
+    return deepest
+
+
+def _merged(root: Node) -> Node:
+    # Bottom-up and iterative. Memoryless control nodes are associative: the inner node of the same
+    # kind goes on, stops and returns exactly where the outer one does.
+    done: dict[int, Node] = {}
+    stack = [(root, False)]
+    while stack:
+        node, ready = stack.pop()
+        match node:
+            case ControlNode() if not ready:
+                stack.append((node, True))
+                stack.extend((child, False) for child in node.children)
+            case ControlNode():
+                children: list[Node] = []
+                for child in node.children:
+                    new = done[id(child)]
+                    if isinstance(new, ControlNode) and new.kind == node.kind:
+                        children.extend(new.children)
+                    else:
+                        children.append(new)
+                done[id(node)] = replace(node, children=tuple(children))
+            case ConditionNode() | ActionNode():
+                done[id(node)] = node
+            case _:
+                assert_never(node)
+    return done[id(root)]
+
+
+def normal(task: Task, condition: Condition) -> Condition:
+    """The condition with ``not`` pushed into the leaves and without constants, repeats, and tests
+    for unknown of variables that are always known. Raises :class:`BbtcError` if it is too deep."""
+    _check_depth(condition)
+    return _normal(task, condition)
+
+
+def _normal(task: Task, condition: Condition) -> Condition:
+    match condition:
+        case Is(variable, Truth.UNKNOWN) if not task.variables[variable].three_valued:
+            return FALSE
+        case Known(variable) if not task.variables[variable].three_valued:
+            return TRUE
+        case Is() | Known() | Constant():
+            return condition
+        case And(parts):
+            return conjunction(_normal(task, part) for part in parts)
+        case Or(parts):
+            return disjunction(_normal(task, part) for part in parts)
+        case Not(part):
+            return _normal(task, negation(part))
+        case _:
+            assert_never(condition)
+
+
+def can_be_unknown(task: Task, condition: Condition) -> bool:
+    """Whether a condition in normal form can have the value unknown."""
+    match condition:
+        case Is(_, Truth.UNKNOWN) | Known() | Constant():
+            return False
+        case Is(variable):
+            return task.variables[variable].three_valued
+        case And(parts) | Or(parts):
+            return any(can_be_unknown(task, part) for part in parts)
+        case Not(part):
+            return can_be_unknown(task, part)
+        case _:
+            assert_never(condition)
+
+
+def _check_depth(condition: Condition) -> None:
+    stack = [(condition, 1)]
+    while stack:
+        part, level = stack.pop()
+        if level > DEEPEST_CONDITION:
+            raise BbtcError.single(
+                "BBT0705", f"a condition has more than {DEEPEST_CONDITION} levels of 'and', 'or' and 'not'"
+            )
+        match part:
+            case And(parts) | Or(parts):
+                stack.extend((p, level + 1) for p in parts)
+            case Not(inner):
+                stack.append((inner, level + 1))
+            case Is() | Known() | Constant():
+                pass
+            case _:
+                assert_never(part)
