@@ -1,0 +1,56 @@
+"""``bbtc compile``: from text to a ground task."""
+
+from __future__ import annotations
+
+import click
+
+from bbtc.cli.output import write, write_depfile
+from bbtc.cli.session import Session, command as session_command, output_options
+
+
+@click.command("compile")
+@click.argument("files", nargs=-1, required=True, metavar="DOMAIN [PROBLEM]")
+@click.option(
+    "--emit",
+    type=click.Choice(["ast", "model", "ground"]),
+    default="ground",
+    show_default=True,
+    help="Which stage to write: the syntax trees, the resolved model, or the ground task.",
+)
+@click.option("--time-limit", type=click.FloatRange(0, min_open=True), metavar="SECONDS", help="Wall-clock time.")
+@output_options
+@session_command
+def command(
+    session: Session,
+    files: tuple[str, ...],
+    emit: str,
+    time_limit: float | None,
+    output: str,
+    check: bool,
+    depfile: str | None,
+) -> None:
+    """Parse, check and ground the PROBLEM of DOMAIN, and write the task as JSON."""
+    from bbtc import artefacts, pipeline
+    from bbtc.limits import Limits
+
+    sources = [session.read(file) for file in files]
+    if emit == "ground":
+        task = pipeline.compile_sources(sources, session.report, Limits(seconds=time_limit))
+        text = artefacts.dumps(artefacts.task_to_json(task))
+        session.say(
+            f"{task.domain}/{task.problem}: {len(task.variables)} variables, {len(task.actions)} actions, "
+            f"{len(task.templates)} templates"
+        )
+    else:
+        documents = pipeline.parse_all(sources, session.report)
+        session.report.raise_errors()
+        if emit == "ast":
+            text = artefacts.dumps(artefacts.syntax_to_json(documents))
+        else:
+            inputs = pipeline.select(documents, session.report)
+            session.report.raise_errors()
+            assert inputs is not None
+            text = artefacts.dumps(artefacts.model_to_json(pipeline.resolve_model(inputs, session.report)))
+    write(output, text, check=check)
+    if depfile is not None:
+        write_depfile(depfile, output, session.inputs)

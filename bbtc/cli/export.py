@@ -1,0 +1,90 @@
+"""``bbtc export``: a tree in a format for people or for an execution engine."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import click
+
+from bbtc.cli.output import write, write_depfile
+from bbtc.cli.session import (
+    Probability,
+    Session,
+    limit_options,
+    limits_from,
+    output_options,
+)
+from bbtc.cli.session import (
+    command as session_command,
+)
+
+
+def _list_formats(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if not value or ctx.resilient_parsing:
+        return
+    from bbtc.export.registry import format_names, load_exporter
+
+    for name in format_names():
+        exporter = load_exporter(name)
+        click.echo(f"{name:10} {exporter.description}")
+        for option in exporter.options:
+            choices = f" ({'|'.join(option.choices)})" if option.choices else ""
+            default = str(option.default).lower() if isinstance(option.default, bool) else option.default
+            click.echo(f"    -O {option.name}={default}  {option.help}{choices}")
+    ctx.exit()
+
+
+@click.command("export")
+@click.argument("files", nargs=-1, required=True, metavar="TREE | DOMAIN [PROBLEM]")
+@click.option("--to", "form", metavar="FORMAT", required=True, help="The format; see --list.")
+@click.option(
+    "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_formats,
+    help="List the formats and their options.",
+)
+@click.option("-O", "--option", "options", multiple=True, metavar="NAME=VALUE", help="An option of the format.")
+@click.option("--target", type=Probability(), help="With DOMAIN: wanted success probability.")
+@click.option("--strategy", default="refine", show_default=True, help="With DOMAIN: how to plan.")
+@limit_options
+@output_options
+@session_command
+def command(
+    session: Session,
+    files: tuple[str, ...],
+    form: str,
+    options: tuple[str, ...],
+    target: Fraction | None,
+    strategy: str,
+    time_limit: float | None,
+    max_states: int,
+    max_nodes: int,
+    output: str,
+    check: bool,
+    depfile: str | None,
+) -> int:
+    """Write TREE in FORMAT. With a DOMAIN and PROBLEM in its place, plan on the way."""
+    from bbtc.cli.inputs import is_artefact, is_tree, task_of, tree_of
+    from bbtc.cli.plan import STATUS_EXIT, run_planner
+    from bbtc.export.registry import load_exporter
+    from bbtc.pipeline import export_tree
+
+    load_exporter(form)  # an unknown format is reported before any work
+    limits = limits_from(time_limit, max_states, max_nodes)
+    sources = [session.read(file) for file in files]
+    status = 0
+    if len(sources) == 1 and is_artefact(sources[0]) and is_tree(sources[0]):
+        tree = tree_of(sources[0])
+    else:
+        plan = run_planner(session, task_of(session, sources, limits), target, strategy, limits, quiet=True)
+        tree, status = plan.tree, STATUS_EXIT[plan.tree.status]
+    pairs = dict(_pair(option) for option in options)
+    write(output, export_tree(tree, form, pairs, limits), check=check)
+    if depfile is not None:
+        write_depfile(depfile, output, session.inputs)
+    return status
+
+
+def _pair(option: str) -> tuple[str, str]:
+    name, equals, value = option.partition("=")
+    if not equals:
+        raise click.UsageError(f"'{option}' is not of the form NAME=VALUE.")
+    return name, value

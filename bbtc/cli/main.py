@@ -1,0 +1,112 @@
+"""The command ``bbtc``: subcommands loaded when used, and exit statuses.
+
+Exit statuses: 0 done; 1 errors in the input, drift, or a target provably out of reach; 2 wrong
+usage; 3 a limit stopped the work; 70 internal error; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+import click
+
+COMMANDS = {
+    "check": "Report what is wrong or doubtful in domains and problems.",
+    "compile": "Parse, check and ground a problem into a task.",
+    "plan": "Plan a tree that reaches the goal with the wanted probability.",
+    "simulate": "Print the exact figures of a tree.",
+    "export": "Write a tree for people or for an execution engine.",
+}
+
+EXIT_ERRORS = 1
+EXIT_LIMIT = 3
+EXIT_INTERNAL = 70
+EXIT_INTERRUPTED = 130
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are imported when they run, so that ``--help`` stays instant."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Every command, in the order of the pipeline."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """The command, imported now."""
+        if cmd_name not in COMMANDS:
+            return None
+        command = import_module(f"bbtc.cli.{cmd_name}").command
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """The commands with their one-line help, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+def _print_version(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        from importlib.metadata import version
+
+        click.echo(f"bbtc {version('bbtc')}")
+        ctx.exit()
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version, help="Print the version."
+)
+@click.option("--debug", is_flag=True, help="Show a traceback for an internal error.")
+@click.option(
+    "--format",
+    "diagnostic_format",
+    type=click.Choice(["text", "json", "sarif", "github"]),
+    default="text",
+    show_default=True,
+    help="How diagnostics are written to stderr (every command takes it, too).",
+)
+@click.pass_context
+def cli(ctx: click.Context, debug: bool, diagnostic_format: str) -> None:
+    """Turn what a robot can do, see and fail at into a behavior tree with a proven probability
+    of success.
+
+    DOMAIN and PROBLEM are files in the bbtc language, a superset of PPDDL; one file may hold both,
+    and `-` is the standard input.
+    """
+    ctx.obj = {"format": diagnostic_format}
+    del debug  # read by main(), which must know it before anything can fail
+
+
+def main() -> None:
+    """Entry point of the program ``bbtc``."""
+    debug = "--debug" in sys.argv
+    try:
+        status = cli.main(standalone_mode=False)
+        sys.exit(status if isinstance(status, int) else 0)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted", err=True)
+        sys.exit(EXIT_INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output has gone (`bbtc … | head`): not an error worth a message.
+        sys.stderr.close()
+        sys.exit(EXIT_ERRORS)
+    except Exception as error:
+        if debug:
+            raise
+        name = type(error).__name__
+        click.echo(
+            f"internal error: {name}: {error}\n"
+            "This is a bug in bbtc, not in your input. Please report it with the input and the output of "
+            "the same command with `bbtc --debug`.",
+            err=True,
+        )
+        sys.exit(EXIT_INTERNAL)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,107 @@
+"""``bbtc plan``: from a domain and a problem, or a compiled task, to a tree."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import click
+
+from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERRUPTED, EXIT_LIMIT
+from bbtc.cli.output import write, write_depfile
+from bbtc.cli.session import (
+    Probability,
+    Session,
+    limit_options,
+    limits_from,
+    output_options,
+)
+from bbtc.cli.session import (
+    command as session_command,
+)
+
+if TYPE_CHECKING:
+    from bbtc.ground.task import Task
+    from bbtc.limits import Limits
+    from bbtc.plan.result import Plan, Refinement
+    from bbtc.tree.nodes import Status
+
+STATUS_EXIT: dict[Status, int] = {
+    "target-reached": 0,
+    "out-of-reach": EXIT_ERRORS,
+    "stuck": EXIT_LIMIT,
+    "limit-reached": EXIT_LIMIT,
+    "interrupted": EXIT_INTERRUPTED,
+}
+
+
+@click.command("plan")
+@click.argument("files", nargs=-1, required=True, metavar="DOMAIN [PROBLEM]")
+@click.option("--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1.")
+@click.option("--strategy", default="refine", show_default=True, help="How to plan.")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
+@limit_options
+@output_options
+@session_command
+def command(
+    session: Session,
+    files: tuple[str, ...],
+    target: Fraction | None,
+    strategy: str,
+    quiet: bool,
+    time_limit: float | None,
+    max_states: int,
+    max_nodes: int,
+    output: str,
+    check: bool,
+    depfile: str | None,
+) -> int:
+    """Plan a tree that reaches the goal with the target probability, and write it as JSON.
+
+    Each refinement is printed: the condition that stopped the runs, what was inserted for it, and
+    the success probability after it. Exit status 0: target reached; 1: out of reach of any policy;
+    3: a limit was reached, or nothing was left to insert (the best tree is written all the same).
+    """
+    from bbtc import artefacts
+    from bbtc.cli.inputs import load_task
+
+    limits = limits_from(time_limit, max_states, max_nodes)
+    task = load_task(session, files, limits)
+    plan = run_planner(session, task, target, strategy, limits, quiet=quiet)
+    write(output, artefacts.dumps(artefacts.tree_to_json(plan.tree)), check=check)
+    if depfile is not None:
+        write_depfile(depfile, output, session.inputs)
+    return STATUS_EXIT[plan.tree.status]
+
+
+def run_planner(
+    session: Session, task: Task, target: Fraction | None, strategy: str, limits: Limits, *, quiet: bool
+) -> Plan:
+    """Plan, telling the session each refinement as it is made and how planning ended."""
+    from bbtc.cli.wording import exact, plan_summary, refinement_line
+    from bbtc.ground.describe import describe
+    from bbtc.pipeline import plan_task
+
+    count = 0
+
+    def tell(step: Refinement) -> None:
+        nonlocal count
+        count += 1
+        if not quiet:
+            for line in refinement_line(count, step):
+                session.say(line)
+
+    if not quiet:
+        wanted = task.goal_probability if target is None else target
+        session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
+    plan = plan_task(task, target, strategy, limits, tell)
+    if plan.tree.status == "stuck":
+        session.report.warning(
+            "BBT0502",
+            f"the strategy '{strategy}' has nothing left to insert before the target",
+            task.goal_span,
+            hint="this does not prove that the target is out of reach",
+        )
+    for line in plan_summary(plan):
+        session.say(line)
+    return plan

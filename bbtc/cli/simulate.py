@@ -1,0 +1,83 @@
+"""``bbtc simulate``: the exact figures of a tree."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import click
+
+from bbtc.cli.output import write
+from bbtc.cli.session import Session, limit_options, limits_from
+from bbtc.cli.session import command as session_command
+
+if TYPE_CHECKING:
+    from bbtc.belief.chain import Chain
+    from bbtc.tree.nodes import Tree
+
+
+@click.command("simulate")
+@click.argument("tree", metavar="TREE")
+@click.option("--scenarios", type=click.IntRange(0), default=0, metavar="N", help="List the N most probable runs.")
+@click.option("--samples", type=click.IntRange(1), metavar="N", help="Also sample N runs (Monte Carlo).")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the sampling.")
+@click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON instead of text.")
+@click.option("-o", "--output", default="-", metavar="FILE", help="Where to write; - is stdout (default).")
+@limit_options
+@session_command
+def command(
+    session: Session,
+    tree: str,
+    scenarios: int,
+    samples: int | None,
+    seed: int,
+    as_json: bool,
+    output: str,
+    time_limit: float | None,
+    max_states: int,
+    max_nodes: int,
+) -> None:
+    """Print the exact figures of TREE: how probably it succeeds, why it fails, what it costs."""
+    from bbtc import artefacts
+    from bbtc.belief.scenarios import sample
+    from bbtc.belief.scenarios import scenarios as runs
+    from bbtc.cli.inputs import tree_of
+    from bbtc.cli.wording import figures_report
+    from bbtc.pipeline import simulate_tree
+
+    loaded = tree_of(session.read(tree))
+    limits = limits_from(time_limit, max_states, max_nodes)
+    figures, chain = simulate_tree(loaded, limits)
+    listed = list(itertools.islice(runs(chain), scenarios))
+    sampled = sample(chain, samples, seed) if samples else None
+    if as_json:
+        write(output, artefacts.dumps(artefacts.figures_to_json(loaded, figures, listed, sampled)))
+        return
+    lines = figures_report(loaded, figures)
+    if sampled is not None:
+        share = sampled.successes / sampled.samples
+        lines.append(f"sampled   {share:.6g} of {sampled.samples} runs succeed (seed {sampled.seed})")
+    lines.extend(_scenario_lines(loaded, chain, scenarios) if listed else [])
+    write(output, "".join(f"{line}\n" for line in lines))
+
+
+def _scenario_lines(tree: Tree, chain: Chain, count: int) -> list[str]:
+    from bbtc.belief.scenarios import scenarios as runs
+    from bbtc.belief.tick import Status
+    from bbtc.cli.wording import exact
+    from bbtc.kleene import Truth
+
+    lines = []
+    for number, run in enumerate(itertools.islice(runs(chain), count), 1):
+        ending = "blocked" if run.status is Status.RUNNING else run.status.word
+        lines.append(f"run {number}: probability {exact(run.probability)}, {ending}")
+        before = run.initial
+        for step in run.steps:
+            changed = [
+                f"{variable.name} = {Truth(new).word}"
+                for variable, old, new in zip(tree.task.variables, before, step.values, strict=True)
+                if old != new
+            ]
+            lines.append(f"  {step.node.action}: {', '.join(changed) or 'no change'}")
+            before = step.values
+    return lines

@@ -1,0 +1,80 @@
+"""Figures and refinements in words."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from bbtc.belief.simulate import Figures
+from bbtc.belief.tick import Status
+from bbtc.ground.describe import describe
+from bbtc.kleene import Truth
+from bbtc.plan.result import Plan, Refinement
+from bbtc.tree.nodes import Tree
+
+_LONGEST_FRACTION = 25
+
+
+def exact(value: Fraction) -> str:
+    """``7/8 (0.875)``, ``1``; a fraction too long to read is given as a decimal marked ``≈``."""
+    if value.denominator == 1:
+        return str(value.numerator)
+    text = f"{value.numerator}/{value.denominator}" if value.denominator < 10**_LONGEST_FRACTION else ""
+    decimal = f"{float(value):.6g}"
+    mark = "" if Fraction(decimal) == value else "≈ "
+    return f"{text} ({mark}{decimal})" if text and len(text) <= _LONGEST_FRACTION else f"≈ {decimal}"
+
+
+def refinement_line(number: int, step: Refinement) -> list[str]:
+    """One refinement as lines of text: what stopped the runs, what was done, what came of it."""
+    why = f"{step.condition} is {step.value.word} in {exact(step.probability)} of the runs"
+    if step.kind == "move":
+        what = f"move the branch of {step.inserted}, which undid it, before it"
+    else:
+        verb = "observe" if step.value is Truth.UNKNOWN else "achieve"
+        chance = exact(step.chance) if step.chance is not None else "?"
+        unmet = f", after {step.unmet} precondition{'s' * (step.unmet != 1)} not yet met" if step.unmet else ""
+        what = f"insert {step.inserted} to {verb} it (with probability {chance}{unmet})"
+    return [f"{number:3d}. {why}", f"     {what}", f"     success {exact(step.success)}, {step.nodes} nodes"]
+
+
+def plan_summary(plan: Plan) -> list[str]:
+    """How planning ended, in words."""
+    tree = plan.tree
+    reached = f"success probability {exact(tree.success_probability)}"
+    wanted = exact(tree.target)
+    match tree.status:
+        case "target-reached":
+            return [f"target {wanted} reached: {reached}"]
+        case "out-of-reach":
+            return [f"target {wanted} is out of reach of any policy; the best tree has {reached}"]
+        case "stuck":
+            return [f"target {wanted} not reached: nothing is left to insert; the best tree has {reached}"]
+        case "limit-reached":
+            stop = plan.stop.message if plan.stop is not None else "a limit was reached"
+            return [f"target {wanted} not reached: {stop}; the best tree so far has {reached}"]
+        case "interrupted":
+            return [f"interrupted; the best tree so far has {reached}"]
+
+
+def figures_report(tree: Tree, figures: Figures) -> list[str]:
+    """The figures of a tree as lines of text."""
+    lines = [f"success   {exact(figures.success)}", f"failure   {exact(figures.failure)}"]
+    if figures.blocked:
+        lines.append(f"blocked   {exact(figures.blocked)}")
+    if figures.endless:
+        lines.append(f"endless   {exact(figures.endless)}")
+    for share in figures.failures:
+        what = "no condition failed"
+        if share.condition is not None:
+            word = "unknown" if share.status is Status.RUNNING else "false"
+            what = f"{describe(tree.task, share.condition)} is {word}"
+        lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")
+    lines.append(f"cost      {_expected(figures.cost, figures.cost_given_success)}")
+    lines.append(f"actions   {_expected(figures.actions, figures.actions_given_success)}")
+    lines.append(f"states    {figures.states}")
+    return lines
+
+
+def _expected(value: Fraction | None, given_success: Fraction | None) -> str:
+    text = f"{exact(value)} expected" if value is not None else "infinite"
+    return text + (f"; {exact(given_success)} given success" if given_success is not None else "")
