@@ -1,0 +1,226 @@
+"""Reading JSON values as what they should be, with a fault that knows its path where they are not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from fractions import Fraction
+from typing import TypeVar
+
+from bbtc.artefacts.jsontext import Path, locate, path_text
+from bbtc.artefacts.numbers import MAX_LENGTH, parse_number
+from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.source import SourceFile
+
+_T = TypeVar("_T")
+
+_MOST_FAULTS = 50
+_MOST_COMPARED = 2000  # names a misspelt one is compared with
+_SURROGATE = re.compile("[\ud800-\udfff]")
+_PRIVATE = "x-"
+_LONGEST_SHOWN = 60
+
+
+class Fault(Exception):
+    """What is wrong with the value at a path."""
+
+    def __init__(self, code: str, path: Path, message: str, hint: str | None = None) -> None:
+        self.code = code
+        self.path = path
+        self.message = message
+        self.hint = hint
+        super().__init__(message)
+
+
+class Stop(Exception):
+    """The faults on record make further reading pointless."""
+
+
+@dataclass(slots=True)
+class Faults:
+    """Collects the faults of an artefact, so that one run reports them all."""
+
+    _found: list[Fault] = field(default_factory=list)
+
+    def attempt(self, read: Callable[[], _T], default: _T) -> _T:
+        """The result of ``read``; if it raises a fault, that goes on record and the default
+        stands in, so that reading goes on."""
+        try:
+            return read()
+        except Fault as fault:
+            self.add(fault)
+            return default
+
+    def require(self, read: Callable[[], _T]) -> _T:
+        """The result of ``read``; if it raises a fault, that goes on record and reading stops."""
+        try:
+            return read()
+        except Fault as fault:
+            self.add(fault)
+            raise Stop from None
+
+    def each(self, items: Sequence[At], read: Callable[[At], _T]) -> list[_T]:
+        """``read`` of every item that has no fault."""
+        results: list[_T] = []
+        for item in items:
+            try:
+                results.append(read(item))
+            except Fault as fault:
+                self.add(fault)
+        return results
+
+    def add(self, fault: Fault) -> None:
+        """Put a fault on record; raises :class:`Stop` when there are very many."""
+        self._found.append(fault)
+        if len(self._found) >= _MOST_FAULTS:
+            raise Stop
+
+    def stop_if_any(self) -> None:
+        """Raise :class:`Stop` if what follows would only repeat the faults on record."""
+        if self._found:
+            raise Stop
+
+    def error(self, source: SourceFile | None) -> BbtcError:
+        """The faults as diagnostics, with places if the text is at hand."""
+        spans = locate(source, [fault.path for fault in self._found]) if source else {}
+        return BbtcError(
+            Diagnostic(
+                fault.code, f"at {path_text(fault.path)}: {fault.message}", spans.get(fault.path), fault.hint
+            )
+            for fault in self._found
+        )
+
+
+def run_reader(read: Callable[[Faults], _T], source: SourceFile | None) -> _T:
+    """The result of ``read``. Raises :class:`BbtcError` with every fault it met."""
+    faults = Faults()
+    try:
+        result = faults.require(lambda: read(faults))
+        faults.stop_if_any()
+    except Stop:
+        raise faults.error(source) from None
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class At:
+    """A JSON value and its path. The methods return it as what it should be, or raise
+    :class:`Fault`."""
+
+    value: object
+    path: Path = ()
+
+    def fault(self, code: str, message: str, hint: str | None = None) -> Fault:
+        """A fault at this place."""
+        return Fault(code, self.path, message, hint)
+
+    def members(self, required: Sequence[str], optional: Sequence[str] = ()) -> dict[str, At]:
+        """The members of an object. Those whose name starts with ``x-`` are anyone's and ignored."""
+        members = self._mapping()
+        missing = [name for name in required if name not in members]
+        if missing:
+            raise self.fault("BBT0603", f"field '{missing[0]}' is missing")
+        found: dict[str, At] = {}
+        for name, value in members.items():
+            if name in required or name in optional:
+                found[name] = At(value, (*self.path, name))
+            elif not name.startswith(_PRIVATE):
+                raise At(value, (*self.path, name)).fault(
+                    "BBT0603", f"unknown field '{clip(name)}'", nearest(name, [*required, *optional])
+                )
+        return found
+
+    def entries(self) -> Iterator[tuple[str, At]]:
+        """The members of an object whose names are data."""
+        return ((name, At(value, (*self.path, name))) for name, value in self._mapping().items())
+
+    def _mapping(self) -> Mapping[str, object]:
+        if not isinstance(self.value, dict):
+            raise self._wrong("an object")
+        return self.value
+
+    def elements(self) -> list[At]:
+        """The elements of an array."""
+        if not isinstance(self.value, list):
+            raise self._wrong("an array")
+        return [At(value, (*self.path, index)) for index, value in enumerate(self.value)]
+
+    def string(self) -> str:
+        """A string that can be written as UTF-8."""
+        if not isinstance(self.value, str):
+            raise self._wrong("a string")
+        if _SURROGATE.search(self.value):
+            raise self.fault("BBT0604", "half a surrogate pair is not a character")
+        return self.value
+
+    def flag(self) -> bool:
+        """``true`` or ``false``."""
+        if not isinstance(self.value, bool):
+            raise self._wrong("true or false")
+        return self.value
+
+    def word(self, *choices: str) -> str:
+        """One of a few strings."""
+        text = self.string()
+        if text not in choices:
+            listed = ", ".join(f"'{choice}'" for choice in choices)
+            raise self.fault("BBT0604", f"must be one of {listed}, not '{clip(text)}'")
+        return text
+
+    def number(self) -> Fraction:
+        """An exact number, written as a string."""
+        if isinstance(self.value, (int, float)) and not isinstance(self.value, bool):
+            raise self.fault("BBT0604", 'numbers are strings, to stay exact: "0.95" or "7/8"')
+        text = self.string()
+        try:
+            return parse_number(text)
+        except ValueError:
+            more = f" (longer than {MAX_LENGTH} characters)" if len(text) > MAX_LENGTH else ""
+            raise self.fault(
+                "BBT0604", f"not a number: '{clip(text)}'{more}", 'write it as "0.95", "7/8" or "2"'
+            ) from None
+
+    def probability(self, zero: bool = True) -> Fraction:
+        """A number from 0 to 1; above 0 unless ``zero``."""
+        value = self.number()
+        if value > 1 or value < 0 or (value == 0 and not zero):
+            low = "from 0 to" if zero else "above 0, up to"
+            raise self.fault("BBT0604", f"a probability is {low} 1, not {clip(self.string())}")
+        return value
+
+    def _wrong(self, expected: str) -> Fault:
+        return self.fault("BBT0604", f"must be {expected}, not {_kind(self.value)}")
+
+
+def _kind(value: object) -> str:
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return "a truth value"
+        case int() | float():
+            return "a number"
+        case str():
+            return f"the string '{clip(value)}'"
+        case list():
+            return "an array"
+        case dict():
+            return "an object"
+        case _:
+            return type(value).__name__
+
+
+def clip(text: str) -> str:
+    """Text of a stranger for a message: printable and not too long."""
+    shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in shown)
+
+
+def nearest(name: str, known: Sequence[str]) -> str | None:
+    """A hint with the nearest known name, if one is near."""
+    if len(known) > _MOST_COMPARED:
+        return None
+    near = get_close_matches(name[:_LONGEST_SHOWN], known, n=1)
+    return f"did you mean '{near[0]}'?" if near else None

@@ -1,0 +1,79 @@
+"""Exact numbers as text.
+
+Two spellings, one reading. A number that was *given* (a probability, cost or reward of the task,
+a target) is written as a decimal where it has a short one, ``"0.95"``, else as a fraction, ``"1/3"``.
+A *figure* that was computed is written as a fraction, ``"31/32"``, because its decimals, where
+they end at all, say nothing. Whole numbers are written as such in both.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+
+MAX_LENGTH = 100_000
+"""Characters a number may have in an artefact, so that reading one cannot take minutes."""
+
+_MAX_DECIMALS = 18
+_CHUNK = 1000  # digits converted at a time: Python refuses to convert more than 4300 at once
+_NUMBER = re.compile(r"(-?)(?:([0-9]+)(?:\.([0-9]+))?|([0-9]+)/([0-9]+))", re.ASCII)
+
+
+def given_text(value: Fraction) -> str:
+    """A number as its author would write it: ``0.95``, ``1/3``, ``2``."""
+    decimals = _decimals(value.denominator)
+    if not decimals:
+        return figure_text(value)
+    digits = _digits(abs(value.numerator) * 10**decimals // value.denominator).rjust(decimals + 1, "0")
+    sign = "-" if value < 0 else ""
+    return f"{sign}{digits[:-decimals]}.{digits[-decimals:]}"
+
+
+def figure_text(value: Fraction) -> str:
+    """A computed number: ``31/32``, ``0``, ``1``."""
+    sign = "-" if value < 0 else ""
+    numerator = f"{sign}{_digits(abs(value.numerator))}"
+    return numerator if value.denominator == 1 else f"{numerator}/{_digits(value.denominator)}"
+
+
+def parse_number(text: str) -> Fraction:
+    """The value of either spelling. Raises ``ValueError`` for any other text."""
+    match = _NUMBER.fullmatch(text) if len(text) <= MAX_LENGTH else None
+    if match is None:
+        raise ValueError("not an exact number")
+    sign, whole, decimals, numerator, denominator = match.groups()
+    if denominator is not None:
+        divisor = _integer(denominator)
+        if not divisor:
+            raise ValueError("division by zero")
+        value = Fraction(_integer(numerator), divisor)
+    else:
+        decimals = decimals or ""
+        value = Fraction(_integer(whole + decimals), 10 ** len(decimals))
+    return -value if sign else value
+
+
+def _decimals(denominator: int) -> int:
+    """Decimals that a reduced fraction with this denominator needs; 0 for a whole number and for
+    one that has no decimal of modest length."""
+    for decimals in range(1, _MAX_DECIMALS + 1):
+        if 10**decimals % denominator == 0:
+            return decimals if denominator > 1 else 0
+    return 0
+
+
+def _digits(value: int) -> str:
+    chunks: list[str] = []
+    base = 10**_CHUNK
+    while value >= base:
+        value, rest = divmod(value, base)
+        chunks.append(str(rest).rjust(_CHUNK, "0"))
+    return "".join([str(value), *reversed(chunks)])
+
+
+def _integer(digits: str) -> int:
+    value = 0
+    for start in range(0, len(digits), _CHUNK):
+        chunk = digits[start : start + _CHUNK]
+        value = value * 10 ** len(chunk) + int(chunk)
+    return value

@@ -1,0 +1,445 @@
+"""The ground task as JSON, in and out. Fields are documented in ``docs/artefacts.md``.
+
+A field that most tasks do not need is written only where it says something, so that what every
+tool must read stays small.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of
+from bbtc.artefacts.cursor import At, Fault, Faults, clip, run_reader
+from bbtc.artefacts.jsontext import Path
+from bbtc.artefacts.numbers import given_text
+from bbtc.diagnostics import BbtcError
+from bbtc.ground.condition import TRUE, Condition
+from bbtc.ground.task import (
+    Body,
+    BodyAction,
+    BodyCondition,
+    BodyControl,
+    BodyTemplate,
+    Effect,
+    Factor,
+    GroundAction,
+    GroundTemplate,
+    InitialState,
+    Outcome,
+    Signature,
+    Task,
+    Variable,
+    ground_name,
+)
+from bbtc.kleene import Truth
+from bbtc.source import SourceFile
+from bbtc.tree.validate import MAX_DEPTH, Problem, active_templates, body_problems
+
+FORMAT = "bbtc-task"
+VERSION = 1
+
+MAX_NESTING = 20
+"""Times that chance may be nested in chance."""
+
+Json: TypeAlias = dict[str, object]
+
+# --- out -------------------------------------------------------------------------------------
+
+
+def task_to_json(task: Task) -> Json:
+    """The task as a JSON object."""
+    value: Json = {
+        "format": FORMAT,
+        "version": VERSION,
+        "domain": task.domain,
+        "problem": task.problem,
+        "goal_probability": given_text(task.goal_probability),
+    }
+    if task.goal_reward:
+        value["goal_reward"] = given_text(task.goal_reward)
+    if task.metric != "cost":
+        value["metric"] = task.metric
+    value["variables"] = [_variable_to_json(variable) for variable in task.variables]
+    value["initial"] = [
+        {
+            "p": given_text(state.probability),
+            "assign": {v.name: truth.word for v, truth in zip(task.variables, state.values, strict=True)},
+        }
+        for state in task.initial
+    ]
+    value["goal"] = condition_to_json(task.goal, task.variables)
+    value["actions"] = [_action_to_json(action, task.variables) for action in task.actions]
+    if task.templates:
+        value["templates"] = [_template_to_json(template, task.variables) for template in task.templates]
+    if task.signatures:
+        value["signatures"] = [
+            {"kind": s.kind, "symbol": s.symbol, "parameters": list(s.parameters)} for s in task.signatures
+        ]
+    return value
+
+
+def _variable_to_json(variable: Variable) -> Json:
+    value: Json = {"name": variable.name}
+    if _split(variable.name) != (variable.predicate, variable.args):
+        value |= {"predicate": variable.predicate, "args": list(variable.args)}
+    return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+
+
+def _action_to_json(action: GroundAction, variables: Sequence[Variable]) -> Json:
+    return {
+        "name": action.name,
+        "schema": action.schema,
+        "args": list(action.args),
+        "cost": given_text(action.cost),
+        "precondition": condition_to_json(action.precondition, variables),
+        **_chance_to_json(action.factors, variables),
+    }
+
+
+def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
+    """``outcomes`` for one plain distribution, ``factors`` for anything more; ``oneof`` tells which
+    of the factors have no known probabilities."""
+    outcomes = [[_outcome_to_json(o, variables) for o in factor.outcomes] for factor in factors]
+    plain = len(factors) == 1 and not any(outcome.factors for outcome in factors[0].outcomes)
+    value: Json = {"outcomes": outcomes[0]} if plain else {"factors": outcomes}
+    unknown = [number for number, factor in enumerate(factors) if factor.oneof]
+    return value | ({"oneof": unknown} if unknown else {})
+
+
+def _outcome_to_json(outcome: Outcome, variables: Sequence[Variable]) -> Json:
+    value: Json = {
+        "p": given_text(outcome.probability),
+        "effects": [_effect_to_json(effect, variables) for effect in outcome.effects],
+    }
+    if outcome.factors:
+        value |= _chance_to_json(outcome.factors, variables)
+        # Never ``outcomes``: an outcome of an outcome would be easy to overlook.
+        if "outcomes" in value:
+            value["factors"] = [value.pop("outcomes")]
+    if outcome.reward:
+        value["reward"] = given_text(outcome.reward)
+    if outcome.cost:
+        value["cost"] = given_text(outcome.cost)
+    return value
+
+
+def _effect_to_json(effect: Effect, variables: Sequence[Variable]) -> Json:
+    values: dict[int, Truth] = {}
+    for variable, truth in effect.sets:
+        # One value for each variable: the Kleene maximum wins, as between effects.
+        values[variable] = max(truth, values.get(variable, truth))
+    return {
+        "when": None if effect.when is None else condition_to_json(effect.when, variables),
+        "set": {variables[variable].name: values[variable].word for variable in sorted(values)},
+    }
+
+
+def _template_to_json(template: GroundTemplate, variables: Sequence[Variable]) -> Json:
+    return {
+        "name": template.name,
+        "template": template.template,
+        "args": list(template.args),
+        "precondition": condition_to_json(template.precondition, variables),
+        **_chance_to_json(template.factors, variables),
+        "body": _body_to_json(template.body, variables),
+    }
+
+
+def _body_to_json(body: Body, variables: Sequence[Variable]) -> Json:
+    match body:
+        case BodyControl(kind, children):
+            return {"type": kind, "children": [_body_to_json(child, variables) for child in children]}
+        case BodyCondition(condition):
+            return {"type": "condition", "condition": condition_to_json(condition, variables)}
+        case BodyAction(action):
+            return {"type": "action", "action": action}
+        case BodyTemplate(template):
+            return {"type": "template", "template": template}
+        case _:
+            assert_never(body)
+
+
+def _split(name: str) -> tuple[str, tuple[str, ...]]:
+    """Symbol and arguments of a ground name, as far as the name alone tells."""
+    symbol, _, rest = name.partition("(")
+    inner = rest.removesuffix(")")
+    return symbol, tuple(inner.split(",")) if inner else ()
+
+
+# --- in --------------------------------------------------------------------------------------
+
+
+def task_from_json(value: object, source: SourceFile | None = None) -> Task:
+    """Inverse of :func:`task_to_json`. Raises :class:`BbtcError` with everything that is wrong;
+    ``source`` is the text the value came from, for the places."""
+    return run_reader(lambda faults: read_task(At(value), faults), source)
+
+
+def check_header(at: At, name: str, version: int) -> None:
+    """Raise a fault unless the value is an object of this format and version."""
+    members = dict(at.entries())
+    for field in ("format", "version"):
+        if field not in members:
+            raise at.fault("BBT0602", f"not a {name} artefact: field '{field}' is missing")
+    if members["format"].value != name:
+        raise members["format"].fault("BBT0602", f"not a {name} artefact")
+    found = members["version"].value
+    if found != version or isinstance(found, bool):
+        newer = isinstance(found, int) and found > version
+        hint = "it was written by a newer bbtc" if newer else None
+        raise members["version"].fault("BBT0602", f"{name} is read in version {version} only", hint)
+
+
+def read_task(at: At, faults: Faults) -> Task:
+    """The task that stands at a place of an artefact. Where it has faults, they go on record and
+    the result is of no use."""
+    check_header(at, FORMAT, VERSION)
+    members = at.members(
+        ["format", "version", "domain", "problem", "variables", "initial", "goal", "actions"],
+        ["goal_probability", "goal_reward", "metric", "templates", "signatures"],
+    )
+    variables = faults.each(members["variables"].elements(), _variable)
+    faults.stop_if_any()  # every mention of a variable would be a fault of its own
+    variables.sort(key=lambda variable: variable.name)
+    _check_distinct(members["variables"], [variable.name for variable in variables])
+    reader = _Reader(tuple(variables), {variable.name: i for i, variable in enumerate(variables)})
+    actions = faults.each(members["actions"].elements(), reader.action)
+    no_goal: Condition = TRUE
+    task = Task(
+        domain=faults.attempt(members["domain"].string, ""),
+        problem=faults.attempt(members["problem"].string, ""),
+        variables=reader.variables,
+        initial=tuple(faults.each(members["initial"].elements(), reader.initial_state)),
+        goal=faults.attempt(lambda: reader.condition(members["goal"]), no_goal),
+        actions=tuple(sorted(actions, key=lambda action: action.name)),
+        templates=tuple(
+            sorted(faults.each(_optional(members, "templates"), reader.template), key=lambda t: t.name)
+        ),
+        goal_probability=faults.attempt(
+            lambda: members["goal_probability"].probability() if "goal_probability" in members else _ONE, _ONE
+        ),
+        goal_reward=faults.attempt(
+            lambda: members["goal_reward"].number() if "goal_reward" in members else _ZERO, _ZERO
+        ),
+        metric=faults.attempt(lambda: _metric(members), "cost"),
+        signatures=tuple(
+            sorted(
+                faults.each(_optional(members, "signatures"), _signature), key=lambda s: (s.kind, s.symbol)
+            )
+        ),
+    )
+    faults.stop_if_any()
+    _check_sum(members["initial"], [state.probability for state in task.initial])
+    _check_distinct(members["actions"], [action.name for action in task.actions])
+    _check_templates(members, task, faults)
+    return task
+
+
+_TEMPLATE_FIELDS = ("name", "template", "args", "precondition", "body")
+_ZERO = Fraction(0)
+_ONE = Fraction(1)
+
+
+def _optional(members: Mapping[str, At], name: str) -> list[At]:
+    return members[name].elements() if name in members else []
+
+
+def _metric(members: Mapping[str, At]) -> Literal["cost", "reward"]:
+    return (
+        "reward" if "metric" in members and members["metric"].word("cost", "reward") == "reward" else "cost"
+    )
+
+
+def _check_distinct(at: At, names: Sequence[str]) -> None:
+    """Raise a fault if two neighbours of a sorted list of names are equal."""
+    for name, following in itertools.pairwise(names):
+        if name == following:
+            raise at.fault("BBT0607", f"'{clip(name)}' stands twice")
+
+
+def _check_sum(at: At, probabilities: Sequence[Fraction]) -> None:
+    total = sum(probabilities, _ZERO)
+    if total != 1:
+        raise at.fault("BBT0608", f"the probabilities sum to {clip(given_text(total))}, not to 1")
+
+
+def _strings(at: At) -> tuple[str, ...]:
+    return tuple(element.string() for element in at.elements())
+
+
+def _variable(at: At) -> Variable:
+    members = at.members(["name", "values"], ["hidden", "predicate", "args"])
+    name = members["name"].string()
+    if "predicate" in members or "args" in members:
+        at.members(["predicate", "args"], list(members))  # both or neither
+        predicate, args = members["predicate"].string(), _strings(members["args"])
+    else:
+        predicate, args = _split(name)
+    _check_name(members["name"], predicate, args)
+    values = [element.word("true", "false", "unknown") for element in members["values"].elements()]
+    if sorted(values) not in (["false", "true"], ["false", "true", "unknown"]):
+        raise members["values"].fault("BBT0604", "the values are true, false and, for some, unknown")
+    hidden = "hidden" in members and members["hidden"].flag()
+    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden)
+
+
+def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
+    expected = ground_name(symbol, args)
+    if at.string() != expected:
+        raise at.fault("BBT0604", f"the name must be '{clip(expected)}', not '{clip(at.string())}'")
+
+
+def _signature(at: At) -> Signature:
+    members = at.members(["kind", "symbol", "parameters"])
+    kind: Literal["predicate", "action"] = (
+        "action" if members["kind"].word("predicate", "action") == "action" else "predicate"
+    )
+    return Signature(kind, members["symbol"].string(), _strings(members["parameters"]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    """Reads what refers to the variables of a task."""
+
+    variables: tuple[Variable, ...]
+    index: Mapping[str, int]
+
+    def condition(self, at: At) -> Condition:
+        return condition_from_json(at, self.index)
+
+    def initial_state(self, at: At) -> InitialState:
+        members = at.members(["p", "assign"])
+        values = self._assignment(members["assign"])
+        if len(values) < len(self.variables):
+            first = next(v.name for i, v in enumerate(self.variables) if i not in values)
+            raise members["assign"].fault("BBT0603", f"variable '{clip(first)}' has no initial value")
+        probability = members["p"].probability(zero=False)
+        return InitialState(probability, tuple(values[i] for i in range(len(self.variables))))
+
+    def _assignment(self, at: At) -> dict[int, Truth]:
+        values: dict[int, Truth] = {}
+        for name, value in at.entries():
+            variable = number_of(value, name, self.index)
+            truth = Truth.from_word(value.word("true", "false", "unknown"))
+            if truth is Truth.UNKNOWN and not self.variables[variable].three_valued:
+                raise value.fault("BBT0604", f"variable '{clip(name)}' cannot be unknown")
+            values[variable] = truth
+        return values
+
+    def action(self, at: At) -> GroundAction:
+        members = at.members(
+            ["name", "schema", "args", "cost", "precondition"], ["outcomes", "factors", "oneof"]
+        )
+        schema, args = members["schema"].string(), _strings(members["args"])
+        _check_name(members["name"], schema, args)
+        return GroundAction(
+            schema,
+            args,
+            self.condition(members["precondition"]),
+            self.chance(at, members),
+            members["cost"].number(),
+        )
+
+    def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
+        """The factors of an object with either ``outcomes`` or ``factors``."""
+        if ("outcomes" in members) == ("factors" in members):
+            raise at.fault("BBT0603", "either 'outcomes' or 'factors' must be there, not both")
+        lists = members["factors"].elements() if "factors" in members else [members["outcomes"]]
+        unknown: set[int] = set()
+        for element in _optional(members, "oneof"):
+            number = element.value
+            if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(lists):
+                raise element.fault("BBT0604", f"must be the number of a factor, below {len(lists)}")
+            unknown.add(number)
+        return tuple(self._factor(part, i in unknown, depth) for i, part in enumerate(lists))
+
+    def _factor(self, at: At, oneof: bool, depth: int) -> Factor:
+        outcomes = tuple(self._outcome(element, depth) for element in at.elements())
+        _check_sum(at, [outcome.probability for outcome in outcomes])
+        return Factor(outcomes, oneof)
+
+    def _outcome(self, at: At, depth: int) -> Outcome:
+        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost"])
+        if depth > MAX_NESTING:
+            raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
+        return Outcome(
+            members["p"].probability(zero=False),
+            tuple(self._effect(element) for element in members["effects"].elements()),
+            self.chance(at, members, depth + 1) if "factors" in members or "oneof" in members else (),
+            members["reward"].number() if "reward" in members else _ZERO,
+            members["cost"].number() if "cost" in members else _ZERO,
+        )
+
+    def _effect(self, at: At) -> Effect:
+        members = at.members(["when", "set"])
+        when = None if members["when"].value is None else self.condition(members["when"])
+        return Effect(when, tuple(sorted(self._assignment(members["set"]).items())))
+
+    def template(self, at: At) -> GroundTemplate:
+        members = at.members(_TEMPLATE_FIELDS, ["outcomes", "factors", "oneof"])
+        symbol, args = members["template"].string(), _strings(members["args"])
+        _check_name(members["name"], symbol, args)
+        return GroundTemplate(
+            symbol,
+            args,
+            self.condition(members["precondition"]),
+            self.chance(at, members),
+            self._body(members["body"], 1),
+        )
+
+    def _body(self, at: At, level: int) -> Body:
+        kind = kind_at(at, "sequence", "fallback", "skipper", "condition", "action", "template")
+        match kind:
+            case "sequence" | "fallback" | "skipper":
+                children = children_at(at.members(["type", "children"])["children"], level)
+                return BodyControl(kind, tuple(self._body(child, level + 1) for child in children))
+            case "condition":
+                return BodyCondition(self.condition(at.members(["type", "condition"])["condition"]))
+            case "action":
+                return BodyAction(at.members(["type", "action"])["action"].string())
+            case _:
+                return BodyTemplate(at.members(["type", "template"])["template"].string())
+
+
+def _check_templates(members: Mapping[str, At], task: Task, faults: Faults) -> None:
+    if not task.templates:
+        return
+    _check_distinct(members["templates"], [template.name for template in task.templates])
+    try:
+        active = active_templates(task.template_by_name)
+    except BbtcError as error:
+        for found in error.diagnostics:
+            faults.add(members["templates"].fault(found.code, found.message))
+        return
+    for element in members["templates"].elements():
+        parts = dict(element.entries())
+        for problem in body_problems(task, task.template_by_name[parts["name"].string()], active):
+            faults.add(problem_fault(problem, parts["body"].path))
+
+
+def problem_fault(problem: Problem, root: Path) -> Fault:
+    """A broken rule of a tree or body as a fault at its node in JSON."""
+    steps = (step for number in problem.path for step in ("children", number))
+    return Fault(problem.code, (*root, *steps), problem.message, problem.hint)
+
+
+def kind_at(at: At, *kinds: str) -> str:
+    """The type of a node."""
+    for name, value in at.entries():
+        if name == "type":
+            return value.word(*kinds)
+    raise at.fault("BBT0603", "field 'type' is missing")
+
+
+def children_at(at: At, level: int) -> list[At]:
+    """The children of a control node that stands at a level, the root's being 1."""
+    children = at.elements()
+    if level >= MAX_DEPTH and children:
+        raise at.fault("BBT0605", f"a tree has at most {MAX_DEPTH} levels")
+    return children
