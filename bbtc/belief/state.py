@@ -68,6 +68,8 @@ def _results(
 ) -> tuple[Result, ...]:
     merged: dict[tuple[Values, Fraction, Fraction], Fraction] = {}
     for (delta, extra, reward), probability in draws.items():
+        if not probability:
+            continue  # an outcome that cannot happen leads nowhere
         after = bytearray(values)
         for variable, value in delta:
             after[variable] = value
