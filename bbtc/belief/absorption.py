@@ -100,9 +100,7 @@ class Absorption:
                 continue
             inside = set(component)
             # v(s) = mass(s) + sum over t in the component of v(t) P(t, s)
-            system = {
-                s: {t: self._rows[t][s] for t in component if s in self._rows[t]} for s in component
-            }
+            system = {s: {t: self._rows[t][s] for t in component if s in self._rows[t]} for s in component}
             for state, value in _solve(system, {s: mass[s] for s in component}).items():
                 visits[state] = value
                 for target, probability in self._rows[state].items():
@@ -126,9 +124,7 @@ class Absorption:
             if not open_states or (component[0] in self.endless and len(open_states) == len(component)):
                 continue
             inside = set(open_states)
-            system = {
-                s: {t: p for t, p in self._rows[s].items() if t in inside} for s in open_states
-            }
+            system = {s: {t: p for t, p in self._rows[s].items() if t in inside} for s in open_states}
             constant = {
                 s: sum((p * values[t] for t, p in self._rows[s].items() if t not in inside), _ZERO)
                 for s in open_states

@@ -86,7 +86,5 @@ def explore(
         finished = state.finished | 1 << action if actions[action].latched else state.finished
         status.append(Status.RUNNING)
         started.append(action)
-        edges.append(
-            tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values))
-        )
+        edges.append(tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values)))
     return Chain(actions, tuple(states), tuple(status), tuple(started), tuple(edges), initial)

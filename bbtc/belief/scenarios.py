@@ -109,7 +109,9 @@ def sample(chain: Chain, samples: int, seed: int, max_steps: int = 100_000) -> S
     return Sampling(samples, seed, successes, cut)
 
 
-def _cumulative(pairs: list[tuple[Fraction, int]] | tuple[tuple[Fraction, int], ...]) -> list[tuple[Fraction, int]]:
+def _cumulative(
+    pairs: list[tuple[Fraction, int]] | tuple[tuple[Fraction, int], ...],
+) -> list[tuple[Fraction, int]]:
     total = Fraction(0)
     cumulative = []
     for probability, value in pairs:

@@ -93,9 +93,7 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
     )
 
 
-def _shares(
-    task: Task, root: Node, chain: Chain, visits: list[Fraction | None]
-) -> tuple[FailureShare, ...]:
+def _shares(task: Task, root: Node, chain: Chain, visits: list[Fraction | None]) -> tuple[FailureShare, ...]:
     finder = FailureFinder(task, root)
     shares: dict[tuple[str, Condition | None, Status], Fraction] = {}
     for state in chain.final:

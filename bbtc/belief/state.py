@@ -63,9 +63,7 @@ def compile_action(action: GroundAction) -> Transition:
     return results
 
 
-def _results(
-    values: Values, cost: Fraction, draws: dict[_Draw, Fraction]
-) -> tuple[Result, ...]:
+def _results(values: Values, cost: Fraction, draws: dict[_Draw, Fraction]) -> tuple[Result, ...]:
     merged: dict[tuple[Values, Fraction, Fraction], Fraction] = {}
     for (delta, extra, reward), probability in draws.items():
         if not probability:
@@ -108,7 +106,13 @@ def _unite(first: _Delta, second: _Delta) -> _Delta:
 
 def _compile_factor(factor: Factor) -> _Drawer:
     outcomes = [
-        (o.probability, o.cost, o.reward, _compile_effects(o.effects), [_compile_factor(f) for f in o.factors])
+        (
+            o.probability,
+            o.cost,
+            o.reward,
+            _compile_effects(o.effects),
+            [_compile_factor(f) for f in o.factors],
+        )
         for o in factor.outcomes
     ]
 

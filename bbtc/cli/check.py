@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from bbtc.cli.session import Session, command as session_command
+from bbtc.cli.session import Session
+from bbtc.cli.session import command as session_command
 from bbtc.syntax.ast import Definition
 
 
@@ -46,7 +47,9 @@ def command(session: Session, files: tuple[str, ...]) -> None:
             session.report.add(diagnostic)
     session.report.raise_errors()
     warnings = len(list(session.report))
-    session.say(f"{len(files)} file{'s' * (len(files) != 1)} checked, {warnings} warning{'s' * (warnings != 1)}")
+    session.say(
+        f"{len(files)} file{'s' * (len(files) != 1)} checked, {warnings} warning{'s' * (warnings != 1)}"
+    )
 
 
 def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import click
 
 from bbtc.cli.output import write, write_depfile
-from bbtc.cli.session import Session, command as session_command, output_options
+from bbtc.cli.session import Session, output_options
+from bbtc.cli.session import command as session_command
 
 
 @click.command("compile")
@@ -17,7 +18,9 @@ from bbtc.cli.session import Session, command as session_command, output_options
     show_default=True,
     help="Which stage to write: the syntax trees, the resolved model, or the ground task.",
 )
-@click.option("--time-limit", type=click.FloatRange(0, min_open=True), metavar="SECONDS", help="Wall-clock time.")
+@click.option(
+    "--time-limit", type=click.FloatRange(0, min_open=True), metavar="SECONDS", help="Wall-clock time."
+)
 @output_options
 @session_command
 def command(

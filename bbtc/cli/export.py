@@ -38,10 +38,16 @@ def _list_formats(ctx: click.Context, _parameter: click.Parameter, value: bool) 
 @click.argument("files", nargs=-1, required=True, metavar="TREE | DOMAIN [PROBLEM]")
 @click.option("--to", "form", metavar="FORMAT", required=True, help="The format; see --list.")
 @click.option(
-    "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_formats,
+    "--list",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_list_formats,
     help="List the formats and their options.",
 )
-@click.option("-O", "--option", "options", multiple=True, metavar="NAME=VALUE", help="An option of the format.")
+@click.option(
+    "-O", "--option", "options", multiple=True, metavar="NAME=VALUE", help="An option of the format."
+)
 @click.option("--target", type=Probability(), help="With DOMAIN: wanted success probability.")
 @click.option("--strategy", default="refine", show_default=True, help="With DOMAIN: how to plan.")
 @limit_options

@@ -36,7 +36,9 @@ def write(path: str, content: str | bytes, *, check: bool = False) -> None:
     if old == data:
         return
     if check:
-        raise BbtcError.single("BBT0008", _drift(path, old, data), hint="run the same command without --check")
+        raise BbtcError.single(
+            "BBT0008", _drift(path, old, data), hint="run the same command without --check"
+        )
     _replace(path, data)
 
 

@@ -37,7 +37,9 @@ STATUS_EXIT: dict[Status, int] = {
 
 @click.command("plan")
 @click.argument("files", nargs=-1, required=True, metavar="DOMAIN [PROBLEM]")
-@click.option("--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1.")
+@click.option(
+    "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
+)
 @click.option("--strategy", default="refine", show_default=True, help="How to plan.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
 @limit_options

@@ -75,7 +75,7 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
         default=None,
         help="How diagnostics are written to stderr.",
     )
-    return option(click.pass_context(cast(Callable[..., None], run)))
+    return option(click.pass_context(cast("Callable[..., None]", run)))
 
 
 class Probability(click.ParamType):  # type: ignore[type-arg,unused-ignore]
@@ -102,9 +102,15 @@ class Probability(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 def output_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """``-o``, ``--check`` and ``--depfile``."""
     for option in (
-        click.option("--depfile", metavar="FILE", help="Write a Make rule that names every input of the output."),
-        click.option("--check", is_flag=True, help="Write nothing; fail with a diff if the output would change."),
-        click.option("-o", "--output", default="-", metavar="FILE", help="Where to write; - is stdout (default)."),
+        click.option(
+            "--depfile", metavar="FILE", help="Write a Make rule that names every input of the output."
+        ),
+        click.option(
+            "--check", is_flag=True, help="Write nothing; fail with a diff if the output would change."
+        ),
+        click.option(
+            "-o", "--output", default="-", metavar="FILE", help="Where to write; - is stdout (default)."
+        ),
     ):
         function = option(function)
     return function
@@ -114,11 +120,26 @@ def limit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """``--time-limit``, ``--max-states`` and ``--max-nodes``; see :func:`limits_from`."""
     defaults = Limits()
     for option in (
-        click.option("--max-nodes", type=click.IntRange(1), default=defaults.nodes, show_default=True, help="Tree nodes."),
         click.option(
-            "--max-states", type=click.IntRange(1), default=defaults.states, show_default=True, help="Simulated states."
+            "--max-nodes",
+            type=click.IntRange(1),
+            default=defaults.nodes,
+            show_default=True,
+            help="Tree nodes.",
         ),
-        click.option("--time-limit", type=click.FloatRange(0, min_open=True), metavar="SECONDS", help="Wall-clock time."),
+        click.option(
+            "--max-states",
+            type=click.IntRange(1),
+            default=defaults.states,
+            show_default=True,
+            help="Simulated states.",
+        ),
+        click.option(
+            "--time-limit",
+            type=click.FloatRange(0, min_open=True),
+            metavar="SECONDS",
+            help="Wall-clock time.",
+        ),
     ):
         function = option(function)
     return function

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
 @click.command("simulate")
 @click.argument("tree", metavar="TREE")
-@click.option("--scenarios", type=click.IntRange(0), default=0, metavar="N", help="List the N most probable runs.")
+@click.option(
+    "--scenarios", type=click.IntRange(0), default=0, metavar="N", help="List the N most probable runs."
+)
 @click.option("--samples", type=click.IntRange(1), metavar="N", help="Also sample N runs (Monte Carlo).")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the sampling.")
 @click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON instead of text.")

@@ -32,7 +32,9 @@ def refinement_line(number: int, step: Refinement) -> list[str]:
     else:
         verb = "observe" if step.value is Truth.UNKNOWN else "achieve"
         chance = exact(step.chance) if step.chance is not None else "?"
-        unmet = f", after {step.unmet} precondition{'s' * (step.unmet != 1)} not yet met" if step.unmet else ""
+        unmet = (
+            f", after {step.unmet} precondition{'s' * (step.unmet != 1)} not yet met" if step.unmet else ""
+        )
         what = f"insert {step.inserted} to {verb} it (with probability {chance}{unmet})"
     return [f"{number:3d}. {why}", f"     {what}", f"     success {exact(step.success)}, {step.nodes} nodes"]
 

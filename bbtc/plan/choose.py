@@ -12,7 +12,7 @@ from fractions import Fraction
 
 from bbtc.belief.state import State, Transition, compile_action
 from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
-from bbtc.ground.task import GroundAction, GroundTemplate, Task
+from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth
 from bbtc.plan.draft import Doing, Subgoal, changed_by
 from bbtc.plan.relaxed import RelaxedReachability, effects_of, possible
@@ -115,7 +115,9 @@ class Chooser:
         tried = sum(a.doing is doing for a in target.subgoal.attempts())
         success = self._success(doing, target, {}, states)
         if success:
-            yield Candidate(doing, self._inserted(doing, conditions), success, _unmet(conditions, states), tried)
+            yield Candidate(
+                doing, self._inserted(doing, conditions), success, _unmet(conditions, states), tried
+            )
             return
         for guard in _guards(doing, frozenset(variables(goal))):
             more = (*conditions, *(c for c in conjuncts(guard) if c not in conditions))

@@ -190,8 +190,10 @@ class _Freezer:
         goal = subgoal.condition
         children: list[Node] = []
         for position, precondition in enumerate(attempt.preconditions):
-            if not precondition.sensing and not precondition.acting and _implied(
-                precondition.condition, subgoal, sensing=sensing
+            if (
+                not precondition.sensing
+                and not precondition.acting
+                and _implied(precondition.condition, subgoal, sensing=sensing)
             ):
                 continue
             if precondition.condition == negation(goal):
@@ -279,5 +281,7 @@ def freeze(draft: Draft) -> Frozen:
     """The draft as a tree."""
     freezer = _Freezer(draft)
     goals = [freezer.subgoal(goal) for goal in draft.goals]
-    root = freezer.control(draft.ids, "sequence", "root", goals) if goals else ControlNode("n0", "sequence", ())
+    root = (
+        freezer.control(draft.ids, "sequence", "root", goals) if goals else ControlNode("n0", "sequence", ())
+    )
     return Frozen(root, freezer.owners, freezer.actions)

@@ -12,12 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
+from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import Failing, FailureFinder
 from bbtc.belief.simulate import figures as chain_figures
 from bbtc.belief.simulate import simulate
 from bbtc.belief.state import State, Transition
-from bbtc.belief.absorption import Absorption
 from bbtc.belief.tick import Status
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import Condition, evaluate, variables
@@ -149,9 +149,7 @@ class _Refiner:
             if candidates:
                 best = candidates[0]
                 self.insert(target, best)
-                return Refinement(
-                    "insert", *common, best.name, best.success, best.unmet, Fraction(0), 0
-                )
+                return Refinement("insert", *common, best.name, best.success, best.unmet, Fraction(0), 0)
             self.closed.add((target.subgoal, target.value))
         return None
 

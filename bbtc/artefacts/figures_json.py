@@ -1,0 +1,81 @@
+"""The figures of a tree as JSON: what ``bbtc simulate --json`` writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from bbtc.artefacts.conditions import condition_to_json
+from bbtc.artefacts.numbers import figure_text
+from bbtc.belief.scenarios import Sampling, Scenario
+from bbtc.belief.simulate import Figures
+from bbtc.belief.state import Values
+from bbtc.belief.tick import Status
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import Tree
+
+
+def figures_to_json(
+    tree: Tree, figures: Figures, scenarios: Sequence[Scenario], sampling: Sampling | None
+) -> dict[str, Any]:
+    """The figures, the scenarios listed, and the sampling, if there was one. Probabilities and
+    expectations are exact; ``null`` is infinite, or, given success, undefined."""
+    variables = tree.task.variables
+
+    def assign(values: Values) -> dict[str, str]:
+        return {v.name: Truth(value).word for v, value in zip(variables, values, strict=True)}
+
+    data: dict[str, Any] = {
+        "format": "bbtc-figures",
+        "version": 1,
+        "domain": tree.task.domain,
+        "problem": tree.task.problem,
+        "success": figure_text(figures.success),
+        "failure": figure_text(figures.failure),
+        "blocked": figure_text(figures.blocked),
+        "endless": figure_text(figures.endless),
+        "failures": [
+            {
+                "p": figure_text(share.probability),
+                "node": share.node,
+                "condition": condition_to_json(share.condition, variables) if share.condition else None,
+                "value": _truth(share.status),
+            }
+            for share in figures.failures
+        ],
+        "cost": _figure(figures.cost),
+        "cost_given_success": _figure(figures.cost_given_success),
+        "actions": _figure(figures.actions),
+        "actions_given_success": _figure(figures.actions_given_success),
+        "reward": _figure(figures.reward),
+        "states": figures.states,
+        "scenarios": [
+            {
+                "p": figure_text(run.probability),
+                "status": "blocked" if run.status is Status.RUNNING else run.status.word,
+                "initial": assign(run.initial),
+                "steps": [
+                    {"node": step.node.id, "action": step.node.action, "assign": assign(step.values)}
+                    for step in run.steps
+                ],
+            }
+            for run in scenarios
+        ],
+    }
+    if sampling is not None:
+        data["sampling"] = {
+            "samples": sampling.samples,
+            "seed": sampling.seed,
+            "successes": sampling.successes,
+            "cut": sampling.cut,
+        }
+    return data
+
+
+def _truth(status: Status) -> str:
+    return "unknown" if status is Status.RUNNING else "false"
+
+
+def _figure(value: Fraction | None) -> str | None:
+    return None if value is None else figure_text(value)
