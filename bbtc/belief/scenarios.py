@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -74,7 +75,7 @@ def _scenario(chain: Chain, probability: Fraction, path: _Path) -> Scenario:
         initial=chain.states[visited[0]].values,
         steps=tuple(
             ScenarioStep(chain.actions[chain.action[before]], chain.states[after].values)
-            for before, after in zip(visited, visited[1:], strict=False)
+            for before, after in itertools.pairwise(visited)
         ),
         status=chain.status[visited[-1]],
     )
@@ -109,9 +110,7 @@ def sample(chain: Chain, samples: int, seed: int, max_steps: int = 100_000) -> S
     return Sampling(samples, seed, successes, cut)
 
 
-def _cumulative(
-    pairs: list[tuple[Fraction, int]] | tuple[tuple[Fraction, int], ...],
-) -> list[tuple[Fraction, int]]:
+def _cumulative(pairs: Sequence[tuple[Fraction, int]]) -> list[tuple[Fraction, int]]:
     total = Fraction(0)
     cumulative = []
     for probability, value in pairs:

@@ -114,12 +114,11 @@ def flow(task: Task, root: Node, chain: Chain) -> dict[str, Fraction]:
     """For every node, the probability that a run ticks it at least once."""
     absorption = Absorption(chain)
     ticked: dict[str, dict[int, Fraction]] = {node.id: {} for node in walk(root)}
-    state = 0
-
-    def observe(node: Node, _status: int) -> None:
-        ticked[node.id][state] = Fraction(1)
-
-    tick = compile_tick(task, root, observe)
-    for state, physical in enumerate(chain.states):
-        tick(physical.values, physical.finished)
+    seen: list[str] = []
+    tick = compile_tick(task, root, lambda node, _: seen.append(node.id))
+    for index, state in enumerate(chain.states):
+        seen.clear()
+        tick(state.values, state.finished)
+        for node in seen:
+            ticked[node][index] = Fraction(1)
     return {node: absorption.start(absorption.hitting(states)) for node, states in ticked.items()}

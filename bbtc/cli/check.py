@@ -21,6 +21,7 @@ def command(session: Session, files: tuple[str, ...]) -> None:
     """
     from bbtc.analysis.check import check
     from bbtc.analysis.resolve import resolve
+    from bbtc.cli.wording import counted
     from bbtc.diagnostics import Report
     from bbtc.pipeline import parse_all
 
@@ -46,10 +47,8 @@ def command(session: Session, files: tuple[str, ...]) -> None:
         for diagnostic in [*report, *(check(model) if model is not None else ())]:
             session.report.add(diagnostic)
     session.report.raise_errors()
-    warnings = len(list(session.report))
-    session.say(
-        f"{len(files)} file{'s' * (len(files) != 1)} checked, {warnings} warning{'s' * (warnings != 1)}"
-    )
+    warnings = counted(len(list(session.report)), "warning")
+    session.say(f"{counted(len(files), 'file')} checked, {warnings}")
 
 
 def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from bbtc.cli.output import write, write_depfile
-from bbtc.cli.session import Session, output_options
+from bbtc.cli.session import Session, output_options, time_limit_option
 from bbtc.cli.session import command as session_command
 
 
@@ -18,9 +18,7 @@ from bbtc.cli.session import command as session_command
     show_default=True,
     help="Which stage to write: the syntax trees, the resolved model, or the ground task.",
 )
-@click.option(
-    "--time-limit", type=click.FloatRange(0, min_open=True), metavar="SECONDS", help="Wall-clock time."
-)
+@time_limit_option
 @output_options
 @session_command
 def command(

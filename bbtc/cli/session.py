@@ -18,6 +18,8 @@ from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 
+_LONGEST_NUMBER = 1000  # characters; more digits than that are a mistake or an attack
+
 
 @dataclass(slots=True)
 class Session:
@@ -87,10 +89,8 @@ class Probability(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         """The value as a rational in [0, 1]; anything else is wrong usage."""
         if isinstance(value, Fraction):
             return value
-        text = str(value)
+        text = str(value)[:_LONGEST_NUMBER]
         try:
-            if len(text) > 1000:
-                raise ValueError
             number = Fraction(text[:-1]) / 100 if text.endswith("%") else Fraction(text)
         except (ValueError, ZeroDivisionError):
             self.fail(f"'{text[:40]}' is not a probability such as 0.9, 9/10 or 90%", param, ctx)
@@ -102,44 +102,31 @@ class Probability(click.ParamType):  # type: ignore[type-arg,unused-ignore]
 def output_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """``-o``, ``--check`` and ``--depfile``."""
     for option in (
-        click.option(
-            "--depfile", metavar="FILE", help="Write a Make rule that names every input of the output."
-        ),
-        click.option(
-            "--check", is_flag=True, help="Write nothing; fail with a diff if the output would change."
-        ),
-        click.option(
-            "-o", "--output", default="-", metavar="FILE", help="Where to write; - is stdout (default)."
-        ),
+        click.option("--depfile", metavar="FILE", help="Write a Make rule that names every input."),
+        click.option("--check", is_flag=True, help="Write nothing; fail if the output would change."),
+        click.option("-o", "--output", default="-", metavar="FILE", help="Where to write; default: stdout."),
     ):
         function = option(function)
     return function
 
 
+time_limit_option = click.option(
+    "--time-limit", type=click.FloatRange(0, min_open=True), metavar="SECONDS", help="Wall-clock time."
+)
+
+
 def limit_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """``--time-limit``, ``--max-states`` and ``--max-nodes``; see :func:`limits_from`."""
     defaults = Limits()
+    at_least_one = click.IntRange(1)
     for option in (
         click.option(
-            "--max-nodes",
-            type=click.IntRange(1),
-            default=defaults.nodes,
-            show_default=True,
-            help="Tree nodes.",
+            "--max-nodes", type=at_least_one, default=defaults.nodes, show_default=True, help="Tree nodes."
         ),
         click.option(
-            "--max-states",
-            type=click.IntRange(1),
-            default=defaults.states,
-            show_default=True,
-            help="Simulated states.",
+            "--max-states", type=at_least_one, default=defaults.states, show_default=True, help="States."
         ),
-        click.option(
-            "--time-limit",
-            type=click.FloatRange(0, min_open=True),
-            metavar="SECONDS",
-            help="Wall-clock time.",
-        ),
+        time_limit_option,
     ):
         function = option(function)
     return function

@@ -24,6 +24,11 @@ def exact(value: Fraction) -> str:
     return f"{text} ({mark}{decimal})" if text and len(text) <= _LONGEST_FRACTION else f"≈ {decimal}"
 
 
+def counted(number: int, noun: str) -> str:
+    """``1 file``, ``2 files``."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
 def refinement_line(number: int, step: Refinement) -> list[str]:
     """One refinement as lines of text: what stopped the runs, what was done, what came of it."""
     why = f"{step.condition} is {step.value.word} in {exact(step.probability)} of the runs"

@@ -103,7 +103,7 @@ class Draft:
     @classmethod
     def start(cls, task: Task) -> Draft:
         """The draft the paper starts from: the goal's conditions, nothing inserted."""
-        return cls(task, [Subgoal(part, None) for part in conjuncts(task.goal)])
+        return cls(task, [Subgoal(part, None) for part in conjuncts(task.goal) or (task.goal,)])
 
     def subgoals(self) -> Iterator[Subgoal]:
         """Every subgoal, parents first."""
@@ -281,7 +281,5 @@ def freeze(draft: Draft) -> Frozen:
     """The draft as a tree."""
     freezer = _Freezer(draft)
     goals = [freezer.subgoal(goal) for goal in draft.goals]
-    root = (
-        freezer.control(draft.ids, "sequence", "root", goals) if goals else ControlNode("n0", "sequence", ())
-    )
+    root = freezer.control(draft.ids, "sequence", "root", goals)
     return Frozen(root, freezer.owners, freezer.actions)
