@@ -1,0 +1,251 @@
+"""Exporter ``py_trees``: a Python module for py_trees 2.2 and later that stands on its own.
+
+It holds the interface that a robot implements, the behaviours that py_trees lacks (copied from
+:mod:`bbtc.export.runtime`), the tree, and a simulated world to run it in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from typing_extensions import assert_never
+
+from bbtc.export.interface import Interface, Leaf, action_symbol, guard_of, interface_of, variable_symbol
+from bbtc.export.names import PYTHON_RESERVED, Symbol, identifiers, printable
+from bbtc.export.pycode import Code, Group, Prefixed, call, layout, literal
+from bbtc.export.pytrees_parts import ConditionCode, method_parameters, runtime_source
+from bbtc.export.pytrees_world import WorldWriter
+from bbtc.export.registry import Figures, Option, OptionValue
+from bbtc.export.shape import fit, normal
+from bbtc.ground.condition import Condition
+from bbtc.ground.describe import describe
+from bbtc.ground.task import Task
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+
+_DEEPEST_EXPRESSION = 10  # levels of nodes in one function; a deeper subtree gets a function
+
+
+@dataclass(frozen=True, slots=True)
+class PyTreesNames:
+    """Which method of the generated interface stands for what."""
+
+    interface: Interface
+    methods: Mapping[Symbol, str]
+
+
+def py_trees_names(tree: Tree) -> PyTreesNames:
+    """The names used in the export of a tree."""
+    interface = interface_of(tree.task, tree.root)
+    return PyTreesNames(interface, identifiers(interface.leaves, "snake", PYTHON_RESERVED))
+
+
+@dataclass(frozen=True, slots=True)
+class PyTreesExporter:
+    """Writes a tree as a Python module."""
+
+    name: str = "py_trees"
+    description: str = "Python module for py_trees 2.2 or later, with a simulated world to run it in"
+    suffix: str = ".py"
+    options: tuple[Option, ...] = ()
+
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
+        """The source text. Raises :class:`BbtcError` (BBT0705) for a tree that is too deep."""
+        del options, figures  # a file that runs has no place for figures
+        return _Writer(tree).module()
+
+
+py_trees = PyTreesExporter()
+
+
+class _Writer:
+    """Writes one module. The tree comes first: it tells which helpers and imports are needed."""
+
+    def __init__(self, tree: Tree) -> None:
+        self.task: Task = tree.task
+        self.claim = tree.success_probability
+        self.root = fit(tree.root, "py_trees")
+        self.names = py_trees_names(tree)
+        self.conditions = ConditionCode()
+        self.world = WorldWriter(tree, self.names.interface, self.names.methods, self.conditions)
+        self.branches: list[list[str]] = []
+
+    def module(self) -> str:
+        """The source text."""
+        body = layout(call("StopWhenBlocked", self._code(self.root, 1)), "return ", level=1)
+        root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *body]
+        tables, world = self.world.tables(), self.world.world()
+        composites: set[str] = {node.kind for node in walk(self.root) if isinstance(node, ControlNode)}
+        nodes = {"Condition", "Action", "Latch", "StopWhenBlocked", "run", *self.conditions.used, *composites}
+        if "skipper" in composites:
+            nodes.add("Skipper")
+        simulation = ["Effect", "Outcome", "Factor", "draw", "happen", "World", "in_words", "simulate"]
+        blocks = [
+            self._protocol(),
+            *runtime_source("pytrees_nodes", nodes),
+            *self.branches,
+            root,
+            *runtime_source("simulated_world", ["Fact", "State", "T", *simulation]),
+            *tables,
+            world,
+            _MAIN.splitlines(),
+        ]
+        lines = [*self._docstring(), "", *_imports(composites)]
+        for block in blocks:
+            lines += ["", "", *block]
+        return "\n".join(lines) + "\n"
+
+    def _docstring(self) -> list[str]:
+        problem, domain = _harmless(self.task.problem), _harmless(self.task.domain)
+        return [
+            f'"""Behavior tree for the problem {problem} of the domain {domain}. Made by bbtc.',
+            "",
+            f"In the model of that domain it succeeds with probability {self.claim}.",
+            *_USAGE.splitlines(),
+            '"""',
+        ]
+
+    # --- interface ---------------------------------------------------------------------------
+
+    def _protocol(self) -> list[str]:
+        lines = _PROTOCOL.splitlines()
+        for leaf in self.names.interface.conditions:
+            result = "bool | None" if leaf.three_valued else "bool"
+            unknown = "; None where that is unknown" if leaf.three_valued else ""
+            lines += self._method(leaf, result, f"Whether {_signature(leaf)} holds{unknown}.")
+        for leaf in self.names.interface.actions:
+            lines += self._method(leaf, "Status", f"Start or continue {_signature(leaf)}.")
+        return lines
+
+    def _method(self, leaf: Leaf, result: str, summary: str) -> list[str]:
+        head = call(f"def {self.names.methods[leaf.symbol]}", *method_parameters(leaf))
+        return ["", *layout(head, suffix=f" -> {result}:", level=1), f'        """{summary}"""']
+
+    # --- tree --------------------------------------------------------------------------------
+
+    def _code(self, node: Node, level: int) -> Code:
+        match node:
+            case ControlNode():
+                if level > _DEEPEST_EXPRESSION:
+                    return self._branch(node)
+                children = [self._code(child, level + 1) for child in node.children]
+                return call(node.kind, literal(_label(node)), *children)
+            case ConditionNode():
+                condition = normal(self.task, node.condition)
+                label = node.name or describe(self.task, condition)
+                return call("Condition", literal(printable(label)), self._test(condition))
+            case ActionNode():
+                return self._action(node)
+            case _:
+                assert_never(node)
+
+    def _branch(self, node: ControlNode) -> Code:
+        body = layout(self._code(node, 1), "return ", level=1)
+        name = f"branch_{len(self.branches) + 1}"
+        title = [f'    """For {_harmless(node.reason)}."""'] if node.reason else []
+        self.branches.append([f"def {name}(robot: Robot) -> Behaviour:", *title, *body])
+        return call(name, "robot")
+
+    def _action(self, node: ActionNode) -> Code:
+        action = self.task.action_by_name[node.action]
+        method = f"robot.{self.names.methods[action_symbol(action)]}"
+        name = literal(printable(node.name or node.action))
+        items: list[Code] = [name, _thunk(call(method, *map(literal, action.args))), "robot.cancel"]
+        guard = guard_of(self.task, node)
+        if guard is not None:
+            items.append(Prefixed("guard=", self._test(normal(self.task, guard))))
+        if not node.latched:
+            items.append("keep=False")
+        return call("Latch", *items)
+
+    def _test(self, condition: Condition) -> Code:
+        return _thunk(self.conditions.write(condition, self._read))
+
+    def _read(self, variable: int) -> Code:
+        read = self.task.variables[variable]
+        return call(f"robot.{self.names.methods[variable_symbol(read)]}", *map(literal, read.args))
+
+
+def _thunk(code: Code) -> Code:
+    """A function without arguments that returns the value of the code."""
+    if isinstance(code, Group) and not code.items:
+        return code.head.removesuffix("(")
+    return Prefixed("lambda: ", code)
+
+
+def _label(node: ControlNode) -> str:
+    reason = f"{node.kind} for {node.reason}" if node.reason else node.kind
+    return printable(node.name or node.template or reason)
+
+
+def _imports(composites: set[str]) -> list[str]:
+    classes = {"skipper": "Composite", "fallback": "Selector", "sequence": "Sequence"}
+    used = ", ".join(sorted(classes[kind] for kind in composites))
+    lines = _IMPORTS.splitlines()
+    if used:
+        lines.insert(lines.index(_AFTER_COMPOSITES), f"from py_trees.composites import {used}")
+    return lines
+
+
+def _signature(leaf: Leaf) -> str:
+    return f"{_harmless(leaf.symbol.name)}({', '.join(leaf.parameters)})"
+
+
+def _harmless(text: str) -> str:
+    # For docstrings: what could end one, or begin an escape in it, becomes a question mark.
+    return "".join(c if c.isascii() and c.isprintable() and c not in '"\\' else "?" for c in text[:100])
+
+
+_CREATE_ROOT = '''\
+    """The tree. Latches stay latched, so it runs once: make a new one for another run."""'''
+
+_USAGE = """\
+Implement the class Robot, and run
+
+    run(create_root(MyRobot()), period=0.1)
+
+As a program, this module runs the tree in a simulated world (--help tells how).
+It needs py_trees 2.2 or later.
+"""
+
+_AFTER_COMPOSITES = "from py_trees.decorators import Decorator"
+
+_IMPORTS = f"""\
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import time
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from typing import Protocol, TypeVar
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+{_AFTER_COMPOSITES}
+from py_trees.trees import BehaviourTree
+"""
+
+_PROTOCOL = '''\
+class Robot(Protocol):
+    """What the tree needs of a robot.
+
+    A condition answers at once: True, False, or None where it is unknown. An action is called in
+    every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
+    conditions show what it did.
+    """
+
+    def cancel(self, action: str) -> None:
+        """The running action, named as in the tree, is no longer wanted."""
+'''
+
+_MAIN = '''\
+def main() -> None:
+    """Run the tree in the simulated world."""
+    simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+
+if __name__ == "__main__":
+    main()
+'''

@@ -1,0 +1,139 @@
+"""The simulated world of a generated py_trees module: the exact outcome distribution of the task,
+as far as the tree can tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+
+from bbtc.export.interface import Interface, Leaf
+from bbtc.export.names import Symbol
+from bbtc.export.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
+from bbtc.export.pytrees_parts import ConditionCode, method_parameters
+from bbtc.export.shape import normal
+from bbtc.ground.condition import variables
+from bbtc.ground.task import Factor, GroundAction, Outcome, Task
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, actions_of, walk
+
+_VALUES = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
+
+
+class WorldWriter:
+    """Writes the tables of facts and actions, and the class that plays the robot."""
+
+    def __init__(
+        self, tree: Tree, interface: Interface, methods: Mapping[Symbol, str], conditions: ConditionCode
+    ) -> None:
+        self._task: Task = tree.task
+        self._interface = interface
+        self._methods = methods
+        self._conditions = conditions
+        names = dict.fromkeys(node.action for node in actions_of(tree.root))
+        self._actions = [self._task.action_by_name[name] for name in sorted(names)]
+        self._relevant = sorted(_relevant(tree, self._actions))
+
+    def tables(self) -> list[list[str]]:
+        """``INITIAL`` and ``ACTIONS``."""
+        initial = layout(self._initial(), "INITIAL: list[tuple[str, State]] = ")
+        actions = mapping(
+            (_tuple((action.schema, *action.args)), self._factors(action.factors)) for action in self._actions
+        )
+        return [
+            [*initial, '"""The states a run may start in, with their probabilities."""'],
+            [
+                *layout(actions, "ACTIONS: dict[Fact, list[Factor]] = "),
+                '"""What each action does: independent choices between outcomes."""',
+            ],
+        ]
+
+    def world(self) -> list[str]:
+        """The class ``SimulatedWorld``."""
+        lines = ["class SimulatedWorld(World):", '    """Plays the robot."""']
+        for leaf in self._interface.conditions:
+            value = flat(call("self._value", *_arguments(leaf)))
+            if leaf.three_valued:
+                lines += self._method(leaf, "bool | None", value)
+            else:
+                lines += self._method(leaf, "bool", f"{value} is True")
+        for leaf in self._interface.actions:
+            lines += self._method(leaf, "Status", flat(call("self._act", *_arguments(leaf))))
+        return lines
+
+    def _method(self, leaf: Leaf, result: str, answer: str) -> list[str]:
+        head = call(f"def {self._methods[leaf.symbol]}", *method_parameters(leaf))
+        return ["", *layout(head, suffix=f" -> {result}:", level=1), f"        return {answer}"]
+
+    def _initial(self) -> Code:
+        merged: dict[tuple[Truth, ...], Fraction] = {}
+        for state in self._task.initial:
+            seen = tuple(state.values[index] for index in self._relevant)
+            merged[seen] = merged.get(seen, Fraction(0)) + state.probability
+        return sequence(
+            call("", _probability(p), self._state(zip(self._relevant, values, strict=True)))
+            for values, p in merged.items()
+        )
+
+    def _state(self, assignment: Iterable[tuple[int, Truth]]) -> Code:
+        return mapping((self._fact(index), _VALUES[value]) for index, value in assignment)
+
+    def _fact(self, index: int) -> str:
+        variable = self._task.variables[index]
+        return _tuple((variable.predicate, *variable.args))
+
+    def _factors(self, factors: tuple[Factor, ...]) -> Code:
+        return sequence(
+            sequence(call("", _probability(o.probability), self._outcome(o)) for o in factor.outcomes)
+            for factor in factors
+        )
+
+    def _outcome(self, outcome: Outcome) -> Code:
+        items: list[Code] = []
+        for effect in outcome.effects:
+            # Where one effect sets a variable twice, the Kleene maximum wins, as between effects.
+            united: dict[int, Truth] = {}
+            for index, value in effect.sets:
+                united[index] = max(value, united.get(index, Truth.FALSE))
+            parts: list[Code] = [self._state(united.items())]
+            if effect.when is not None:
+                when = self._conditions.write(normal(self._task, effect.when), self._read)
+                parts.append(Prefixed("when=lambda s: ", when))
+            items.append(call("Effect", *parts))
+        if outcome.factors:
+            items.append(Prefixed("then=", self._factors(outcome.factors)))
+        return call("Outcome", *items)
+
+    def _read(self, index: int) -> Code:
+        return f"s[{self._fact(index)}]"
+
+
+def _relevant(tree: Tree, actions: list[GroundAction]) -> set[int]:
+    """What the tree or an effect reads, or an action of the tree sets."""
+    task = tree.task
+    found: set[int] = set()
+    for node in walk(tree.root):
+        if isinstance(node, ConditionNode):
+            found.update(variables(node.condition))
+        elif isinstance(node, ActionNode) and node.guarded:
+            found.update(variables(task.action_by_name[node.action].precondition))
+    stack = [factor for action in actions for factor in action.factors]
+    while stack:
+        for outcome in stack.pop().outcomes:
+            stack.extend(outcome.factors)
+            for effect in outcome.effects:
+                found.update(index for index, _ in effect.sets)
+                if effect.when is not None:
+                    found.update(variables(effect.when))
+    return found
+
+
+def _probability(value: Fraction) -> str:
+    return literal(str(value))
+
+
+def _tuple(words: tuple[str, ...]) -> str:
+    return f"({', '.join(map(literal, words))}{',' if len(words) == 1 else ''})"
+
+
+def _arguments(leaf: Leaf) -> list[str]:
+    return [literal(leaf.symbol.name), *leaf.parameters]

@@ -1,0 +1,1 @@
+"""Code that exported files carry with them. Real modules: type-checked and tested as they stand."""

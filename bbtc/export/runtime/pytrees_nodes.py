@@ -1,0 +1,178 @@
+"""py_trees behaviours of a belief behavior tree, copied into the modules that bbtc writes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite, Selector, Sequence
+from py_trees.decorators import Decorator
+from py_trees.trees import BehaviourTree
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
+
+
+def negated(value: bool | None) -> bool | None:
+    """Three-valued "not": unknown stays unknown."""
+    return None if value is None else not value
+
+
+class Condition(Behaviour):
+    """SUCCESS, FAILURE or RUNNING for a condition that is True, False or None (unknown)."""
+
+    def __init__(self, name: str, read: Callable[[], bool | None]) -> None:
+        super().__init__(name=name)
+        self._read = read
+
+    def update(self) -> Status:
+        value = self._read()
+        if value is None:
+            return Status.RUNNING
+        return Status.SUCCESS if value else Status.FAILURE
+
+
+class Action(Behaviour):
+    """Calls the robot at every tick until the action ends; cancels it if it is no longer wanted."""
+
+    def __init__(self, name: str, act: Callable[[], Status], cancel: Callable[[str], None]) -> None:
+        super().__init__(name=name)
+        self._act = act
+        self._cancel = cancel
+
+    def update(self) -> Status:
+        status = self._act()
+        if status not in (Status.SUCCESS, Status.FAILURE, Status.RUNNING):
+            raise TypeError(f"{self.name} returned {status!r}, not SUCCESS, FAILURE or RUNNING")
+        return status
+
+    def terminate(self, new_status: Status) -> None:
+        if self.status == Status.RUNNING and new_status == Status.INVALID:
+            self._cancel(self.name)
+
+
+class Latch(Decorator):
+    """Runs its action once and returns how it ended at every later tick. The status is withheld
+    until the next tick, because conditions to the left were read before the action's effect. An
+    action interrupted after its start counts as run. A guard must be True for it to start; with
+    ``keep=False`` it starts again whenever it is ticked."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name=name, child=Action(name, act, cancel))
+        self.acting = False
+        self._guard = guard
+        self._keep = keep
+        self._started = False
+        self._final: Status | None = None
+
+    def tick(self) -> Iterator[Behaviour]:
+        self.acting = False
+        if self._final is not None:
+            self.stop(self._final)
+            yield self
+            return
+        ready = True if self._started or self._guard is None else self._guard()
+        if ready:
+            self.acting = self._started = True
+            yield from self.decorated.tick()
+            if self.decorated.status != Status.RUNNING:
+                self._end(self.decorated.status)
+        if ready or ready is None:
+            self.status = Status.RUNNING
+        else:
+            self.stop(Status.FAILURE)
+        yield self
+
+    def update(self) -> Status:
+        return self.status
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status == Status.INVALID and self._started:
+            self._end(Status.SUCCESS)
+
+    def _end(self, status: Status) -> None:
+        self._started = False
+        self._final = status if self._keep else None
+
+
+class Skipper(Composite):
+    """Goes on to the next child while the child is RUNNING; returns the first SUCCESS or FAILURE."""
+
+    def tick(self) -> Iterator[Behaviour]:
+        status = Status.RUNNING
+        for child in self.children:
+            yield from child.tick()
+            self.current_child = child
+            status = child.status
+            if status != Status.RUNNING:
+                break
+        if status != Status.RUNNING:
+            for child in self.children:
+                if child is not self.current_child and child.status != Status.INVALID:
+                    child.stop(Status.INVALID)
+            self.stop(status)
+        self.status = status
+        yield self
+
+
+def sequence(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children succeed. Every tick starts at the first child."""
+    return Sequence(name, memory=False, children=list(children))
+
+
+def fallback(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children fail. Every tick starts at the first child."""
+    return Selector(name, memory=False, children=list(children))
+
+
+def skipper(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children are running. Every tick starts at the first child."""
+    return Skipper(name, children=list(children))
+
+
+class StopWhenBlocked(Decorator):
+    """FAILURE where the tree is RUNNING but no action is: something is unknown that nothing can
+    observe, and nothing would ever change."""
+
+    def __init__(self, child: Behaviour) -> None:
+        super().__init__(name="stop when blocked", child=child)
+
+    def update(self) -> Status:
+        status = self.decorated.status
+        if status == Status.RUNNING and not any(
+            isinstance(node, Latch) and node.acting and node.status == Status.RUNNING
+            for node in self.decorated.iterate()
+        ):
+            self.feedback_message = "blocked: nothing can observe what is unknown"
+            return Status.FAILURE
+        return status
+
+
+def run(root: Behaviour, period: float = 0.0) -> Status:
+    """Tick a tree until it ends, with a pause of ``period`` seconds between ticks."""
+    tree = BehaviourTree(root)
+    while True:
+        tree.tick()
+        if root.status != Status.RUNNING:
+            return root.status
+        time.sleep(period)
