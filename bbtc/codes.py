@@ -46,8 +46,22 @@ CODES: dict[str, str] = {
     "BBT0221": "section in the wrong definition",
     "BBT0222": "derived predicate depends on its own negation",
     "BBT0223": "initial fact with two values",
+    "BBT0224": "foreach without a node around it",
     # 03xx: checks
     # 04xx: grounding
+    "BBT0401": "too many ground actions or facts",
+    "BBT0402": "grounding ran out of time or memory",
+    "BBT0403": "too many initial states",
+    "BBT0404": "oneof in the initial state",
+    "BBT0405": "uncertain condition in the initial state",
+    "BBT0406": "observation",
+    "BBT0407": "sensor",
+    "BBT0408": "recursive derived predicate",
+    "BBT0409": "conditional cost or reward",
+    "BBT0410": "number without a value",
+    "BBT0411": "no goal to plan for",
+    "BBT0412": "goal out of reach",
+    "BBT0413": "goal already holds",
     # 05xx: planning
     "BBT0501": "unknown strategy",
     "BBT0502": "nothing left to insert before the target",

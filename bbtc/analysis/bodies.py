@@ -18,6 +18,13 @@ def template(names: Names, node: ast.Template) -> md.Template:
     """A template; parts with errors, which are reported, count as true conditions."""
     signature = names.templates[node.name.key]
     scope = {parameter.name: parameter for parameter in signature.parameters}
+    if isinstance(node.body, ast.BodyForeach):
+        names.report.error(
+            "BBT0224",
+            "`foreach` becomes children of the node around it, and there is none",
+            node.body.span,
+            "put it into a `sequence`, a `fallback` or a `skipper`",
+        )
     return md.Template(
         node.name.key,
         signature.parameters,

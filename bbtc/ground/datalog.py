@@ -1,0 +1,144 @@
+"""Runs a Datalog program with clingo's grounder and gives back the facts it derives.
+
+Small programs are grounded in this process, large ones in a child process that streams its facts:
+the grounder cannot be interrupted, a process can be ended when a limit is met.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from bbtc.diagnostics import LimitReached
+from bbtc.ground.limits import GroundLimits
+
+Row = tuple[int, ...]
+_CHUNK = 1 << 20
+
+
+def derive(
+    program: Sequence[str],
+    outputs: Mapping[str, int],
+    counted: frozenset[str],
+    limits: GroundLimits,
+    *,
+    small: bool,
+) -> dict[str, list[Row]]:
+    """The derived facts of each predicate of ``outputs`` (name to arity), arguments as integers.
+
+    Facts of ``counted`` predicates are bounded by ``limits.actions``, all together by
+    ``limits.facts``. ``small`` says that the program cannot derive many facts. Raises
+    :class:`LimitReached` (codes BBT0401, BBT0402).
+    """
+    if small:
+        return _in_process(program, outputs)
+    return _in_child(program, outputs, counted, limits)
+
+
+def _in_process(program: Sequence[str], outputs: Mapping[str, int]) -> dict[str, list[Row]]:
+    import clingo
+
+    control = clingo.Control(["--warn=none"])
+    control.add("base", [], "\n".join(program))
+    control.ground([("base", [])])
+    atoms = control.symbolic_atoms
+    return {
+        name: [tuple(arg.number for arg in atom.symbol.arguments) for atom in atoms.by_signature(name, arity)]
+        for name, arity in outputs.items()
+    }
+
+
+# --- the child process -----------------------------------------------------------------------
+
+_CHILD = """
+import sys
+memory = int(sys.argv[1])
+if memory:
+    try:
+        import resource
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    except (ImportError, ValueError, OSError):
+        pass
+from clingo.application import Application, clingo_main
+clingo_main(Application(), ["--mode=gringo", "--text", "--warn=none", sys.argv[2]])
+"""
+
+
+def _in_child(
+    program: Sequence[str], outputs: Mapping[str, int], counted: frozenset[str], limits: GroundLimits
+) -> dict[str, list[Row]]:
+    deadline = None if limits.seconds is None else time.monotonic() + limits.seconds
+    with tempfile.TemporaryDirectory(prefix="bbtc-") as folder:
+        path = Path(folder, "program.lp")
+        path.write_text("\n".join(program), encoding="ascii")
+        command = [sys.executable, "-I", "-c", _CHILD, str(limits.memory or 0), str(path)]
+        # Our own interpreter and our own program text: nothing of the input is a command.
+        process = subprocess.Popen(  # noqa: S603
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        timer = None if limits.seconds is None else threading.Timer(limits.seconds, process.kill)
+        try:
+            if timer is not None:
+                timer.start()
+            rows = _collect(process, outputs, counted, limits)
+            process.wait()
+        finally:
+            if timer is not None:
+                timer.cancel()
+            process.kill()
+            process.communicate()
+    if process.returncode not in (0, 10, 20, 30):
+        if deadline is not None and time.monotonic() >= deadline:
+            raise _limit("BBT0402", f"grounding took longer than {limits.seconds:g} s")
+        raise _limit("BBT0402", "grounding ran out of memory")
+    return rows
+
+
+def _collect(
+    process: subprocess.Popen[bytes],
+    outputs: Mapping[str, int],
+    counted: frozenset[str],
+    limits: GroundLimits,
+) -> dict[str, list[Row]]:
+    assert process.stdout is not None
+    rows: dict[bytes, list[Row]] = {name.encode(): [] for name in outputs}
+    bounded = [name.encode() for name in counted]
+    facts = 0
+    for lines in _blocks(process.stdout.fileno()):
+        facts += len(lines)
+        for line in lines:
+            # A fact reads `name(1,2).` or `name.`.
+            name, _, args = line.partition(b"(")
+            found = rows.get(name.rstrip(b"."))
+            if found is not None:
+                found.append(tuple(map(int, args[:-2].split(b","))) if args else ())
+        if facts > limits.facts:
+            raise _limit("BBT0401", f"grounding derives more than {limits.facts} facts")
+        if sum(len(rows[name]) for name in bounded) > limits.actions:
+            raise _limit("BBT0401", f"the task has more than {limits.actions} ground actions")
+    return {name.decode(): found for name, found in rows.items()}
+
+
+def _blocks(descriptor: int) -> Iterator[list[bytes]]:
+    """Whole lines, as they come, many at a time."""
+    rest = b""
+    while chunk := os.read(descriptor, _CHUNK):
+        lines = (rest + chunk).split(b"\n")
+        rest = lines.pop()
+        yield lines
+    if rest:
+        yield [rest]
+
+
+def _limit(code: str, message: str) -> LimitReached:
+    limit = LimitReached.single(
+        code, message, hint="raise the limit, or give parameters more precise types and preconditions"
+    )
+    assert isinstance(limit, LimitReached)
+    return limit

@@ -1,0 +1,136 @@
+"""The initial belief: certain facts, and a probabilistic ``:init`` spelled out into states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from typing_extensions import assert_never
+
+from bbtc.diagnostics import Report
+from bbtc.ground.limits import GroundLimits
+from bbtc.kleene import Truth
+from bbtc.model import domain as md
+from bbtc.model import effect as me
+from bbtc.model.formula import is_parameter
+
+Key = tuple[str, tuple[str, ...]]
+World = dict[Key, Truth]
+
+
+@dataclass(frozen=True, slots=True)
+class Beginning:
+    """Facts of every initial state, and what each state adds to (or changes in) them."""
+
+    facts: World
+    states: tuple[tuple[Fraction, World], ...]
+
+
+def beginning(model: md.Model, report: Report, limits: GroundLimits) -> Beginning:
+    """The initial states of a model. Constructs that need hidden facts are refused with their own
+    codes: BBT0404 (``oneof``), BBT0405 (``or`` and other clauses), BBT0403 (too many states)."""
+    facts = {(fact.predicate, fact.args): fact.value for fact in model.init.facts}
+    for clause in model.init.clauses:
+        what = "`invariant`" if clause.invariant else "`or` and other uncertain conditions"
+        report.error(
+            "BBT0405",
+            f"{what} in `:init` cannot be grounded yet",
+            clause.span,
+            "only facts, `(unknown …)` and `(probabilistic …)` can",
+        )
+    states: list[tuple[Fraction, World]] = [(Fraction(1), {})]
+    for choice in model.init.choices:
+        if _has_oneof(choice):
+            report.error(
+                "BBT0404",
+                "`oneof` in `:init` cannot be grounded yet",
+                choice.span,
+                "only facts, `(unknown …)` and `(probabilistic …)` can",
+            )
+            continue
+        try:
+            states = _product(
+                [states, _draw(model, choice, {}, limits.initial_states)], limits.initial_states
+            )
+        except _TooMany:
+            report.error(
+                "BBT0403",
+                f"the draws in `:init` make more than {limits.initial_states} initial states",
+                choice.span,
+            )
+            break
+    return Beginning(facts, tuple(states))
+
+
+class _TooMany(Exception):
+    """A draw has more results than the limit allows."""
+
+
+def _has_oneof(effect: me.Effect) -> bool:
+    match effect:
+        case me.Choice(branches, oneof):
+            return (oneof and len(branches) > 1) or any(_has_oneof(branch.effect) for branch in branches)
+        case me.Together(parts):
+            return any(map(_has_oneof, parts))
+        case me.ForEach(_, inner) | me.When(_, inner):
+            return _has_oneof(inner)
+        case me.Set() | me.Add():
+            return False
+        case _:
+            assert_never(effect)
+
+
+def _draw(
+    model: md.Model, effect: me.Effect, binding: dict[str, str], limit: int
+) -> list[tuple[Fraction, World]]:
+    match effect:
+        case me.Set(predicate, args, value):
+            atom = (predicate, tuple(binding[arg] if is_parameter(arg) else arg for arg in args))
+            return [(Fraction(1), {atom: value})]
+        case me.Add():
+            return [(Fraction(1), {})]
+        case me.When(_, inner):
+            return _draw(model, inner, binding, limit)
+        case me.Choice(branches):
+            return _merged(
+                [
+                    (branch.probability * p, world)
+                    for branch in branches
+                    if branch.probability > 0
+                    for p, world in _draw(model, branch.effect, binding, limit)
+                ]
+            )
+        case me.Together(parts):
+            return _product([_draw(model, part, binding, limit) for part in parts], limit)
+        case me.ForEach(parameters, inner):
+            bindings = [binding]
+            for parameter in parameters:
+                bindings = [
+                    {**each, parameter.name: name}
+                    for each in bindings
+                    for name, thing in model.objects.items()
+                    if any(model.types.is_subtype(type_, parameter.types) for type_ in thing.types)
+                ]
+            return _product([_draw(model, inner, each, limit) for each in bindings], limit)
+        case _:
+            assert_never(effect)
+
+
+def _product(draws: list[list[tuple[Fraction, World]]], limit: int) -> list[tuple[Fraction, World]]:
+    result: list[tuple[Fraction, World]] = [(Fraction(1), {})]
+    for draw in draws:
+        if len(result) * len(draw) > 4 * limit:
+            raise _TooMany
+        result = _merged([(p * q, {**world, **more}) for p, world in result for q, more in draw])
+        if len(result) > limit:
+            raise _TooMany
+    return result
+
+
+def _merged(draws: list[tuple[Fraction, World]]) -> list[tuple[Fraction, World]]:
+    merged: dict[frozenset[tuple[Key, Truth]], tuple[Fraction, World]] = {}
+    for probability, world in draws:
+        key = frozenset(world.items())
+        before = merged.get(key)
+        merged[key] = (probability if before is None else before[0] + probability, world)
+    return list(merged.values())
