@@ -6,15 +6,13 @@ import re
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import cast
-
-from lark import Lark
-from lark.exceptions import UnexpectedInput
 
 from bbtc.diagnostics import Report
 from bbtc.source import SourceFile, Span
 from bbtc.syntax import ast
-from bbtc.syntax.build import SOURCE, Builder, Misuse
+from bbtc.syntax.build import Builder
+from bbtc.syntax.engine import Engine, Unexpected, make_tables
+from bbtc.syntax.leaves import SOURCE, Misuse
 
 _COMMENT = re.compile(r";[^\r\n]*")
 
@@ -28,16 +26,8 @@ def grammar_text() -> str:
 
 
 @lru_cache(maxsize=1)
-def _parser() -> Lark:
-    return Lark(
-        grammar_text(),
-        parser="lalr",
-        lexer="contextual",
-        start="document",
-        transformer=Builder(),
-        g_regex_flags=re.IGNORECASE | re.ASCII,
-        maybe_placeholders=False,
-    )
+def _parser() -> Engine:
+    return Engine(make_tables(grammar_text(), "document"), Builder())
 
 
 def parse(source: SourceFile, report: Report) -> ast.Document:
@@ -51,10 +41,9 @@ def parse(source: SourceFile, report: Report) -> ast.Document:
     token = SOURCE.set(source)
     definitions: tuple[ast.Definition, ...] = ()
     try:
-        definitions = cast("tuple[ast.Definition, ...]", _parser().parse(text))
-    except UnexpectedInput as error:
-        at = error.pos_in_stream or -1
-        at = at if 0 <= at < len(text) else len(text)
+        definitions = _parser().parse(text)
+    except Unexpected as error:
+        at = error.position
         report.error("BBT0101", "cannot be read", Span(source, at, at + 1))
     except Misuse as error:
         report.error(error.code, error.message, error.span, error.hint)

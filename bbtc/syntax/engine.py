@@ -1,0 +1,232 @@
+"""The LALR automaton of the grammar, run by a loop of our own.
+
+Lark reads the grammar and computes the tables, in the form that its generator of stand-alone parsers
+writes. Its own loop makes an object with line and column for every token and one more for every rule,
+which takes three times as long as the loop below; and planning files come in megabytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+from lark import Lark
+from lark.grammar import Rule
+from lark.lexer import TerminalDef
+
+END = "$END"
+_FLAGS = re.IGNORECASE | re.ASCII
+_SPACE = re.compile(r"\s*", _FLAGS)
+
+
+class Token(NamedTuple):
+    """A terminal as it stands in the text, with its range of characters."""
+
+    kind: str
+    text: str
+    start: int
+    end: int
+
+
+class Production(NamedTuple):
+    """A rule of the grammar."""
+
+    origin: str
+    size: int
+    splice: tuple[int, ...]
+    """Positions of the children that are lists to be laid open: those of rules whose name starts
+    with ``_``."""
+    call: str | None
+    """Name of the builder's method; None for a list to be laid open."""
+    single: bool
+    """A single child stands for the whole (``?rule``)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """An LALR automaton, as plain data."""
+
+    start: int
+    end: int
+    productions: tuple[Production, ...]
+    actions: Mapping[int, Mapping[str, int]]
+    """By state and terminal: the next state, or ``-1 - n`` to reduce production n."""
+    goto: Mapping[int, Mapping[str, int]]
+    """By state and rule: the next state."""
+    terminals: Mapping[str, str]
+    """Regular expression of each terminal, in the order in which they are tried."""
+
+
+_Scanner: TypeAlias = Callable[[str, int], "re.Match[str] | None"]
+
+
+class Unexpected(Exception):
+    """No token of the grammar may stand at a position of the text."""
+
+    def __init__(self, position: int, stack: list[int]) -> None:
+        super().__init__(position)
+        self.position, self.stack = position, stack
+
+
+def make_tables(grammar: str, start: str) -> Tables:
+    """The automaton of a Lark grammar."""
+    lark = Lark(grammar, parser="lalr", lexer="contextual", start=start, g_regex_flags=_FLAGS)
+    data, memo = lark.memo_serialize([TerminalDef, Rule])
+    table = data["parser"]["parser"]
+    terminals = sorted(lark.terminals, key=lambda t: (-t.priority, -len(t.pattern.to_regexp()), t.name))
+    kinds = {terminal.name for terminal in terminals} | {END}
+    productions: dict[int, Production] = {
+        number: _production(rule) for number, rule in memo.items() if rule["__type__"] == "Rule"
+    }
+    position = {number: at for at, number in enumerate(productions)}
+    actions: dict[int, dict[str, int]] = {}
+    goto: dict[int, dict[str, int]] = {}
+    for state, row in table["states"].items():
+        cells = {table["tokens"][symbol]: cell for symbol, cell in row.items()}
+        actions[state] = {
+            symbol: -1 - position[target["@"]] if reduces else target
+            for symbol, (reduces, target) in cells.items()
+            if symbol in kinds
+        }
+        goto[state] = {symbol: target for symbol, (_, target) in cells.items() if symbol not in kinds}
+    return Tables(
+        table["start_states"][start],
+        table["end_states"][start],
+        tuple(productions.values()),
+        actions,
+        goto,
+        {
+            terminal.name: terminal.pattern.to_regexp()
+            for terminal in terminals
+            if terminal.name not in lark.ignore_tokens
+        },
+    )
+
+
+def _production(rule: Mapping[str, Any]) -> Production:
+    origin = rule["origin"]["name"]
+    expansion = [symbol["name"] for symbol in rule["expansion"]]
+    splice = tuple(at for at, name in enumerate(expansion) if name.startswith("_"))
+    alias = rule["alias"]
+    single = bool(rule["options"]["expand1"]) and len(expansion) == 1 and alias is None and not splice
+    return Production(
+        origin, len(expansion), splice, None if origin.startswith("_") else alias or origin, single
+    )
+
+
+class Engine:
+    """A parser for one grammar.
+
+    ``builder`` has a method for every rule or alias. The method takes the list of the rule's children:
+    tokens, and what the methods of other rules returned.
+    """
+
+    def __init__(self, tables: Tables, builder: object) -> None:
+        self._start, self._end = tables.start, tables.end
+        self._actions = tables.actions
+        self._goto = tables.goto
+        self._reductions = [
+            (
+                p.size,
+                p.origin,
+                p.splice,
+                getattr(builder, p.call) if p.call and not p.single else None,
+                p.single,
+            )
+            for p in tables.productions
+        ]
+        self._terminals = tables.terminals
+        self._scanners: dict[int, _Scanner] = {}
+        self._compiled: dict[frozenset[str], _Scanner] = {}
+
+    def parse(self, text: str) -> Any:
+        """The value of the start rule for a text. Raises :class:`Unexpected`."""
+        actions, goto, reductions, scanners = self._actions, self._goto, self._reductions, self._scanners
+        make: Any = tuple.__new__
+        state, end = self._start, self._end
+        states: list[int] = [state]
+        values: list[Any] = []
+        position = _SPACE.match(text).end()  # type: ignore[union-attr]
+        while True:
+            match = (scanners.get(state) or self._scanner(state))(text, position)
+            if match is not None:
+                kind: Any = match.lastgroup
+                token = make(Token, (kind, match[kind], *match.span(kind)))
+            elif position == len(text):
+                kind, token = END, None
+            else:
+                raise Unexpected(position, states)
+            while True:
+                action = actions[state].get(kind)
+                if action is None:
+                    raise Unexpected(position, states)
+                if action >= 0:
+                    break
+                size, origin, splice, call, single = reductions[-1 - action]
+                if single:
+                    del states[-1]
+                else:
+                    if size:
+                        children = values[-size:]
+                        del states[-size:], values[-size:]
+                        if splice:
+                            children = _laid_open(children, splice)
+                    else:
+                        children = []
+                    values.append(children if call is None else call(children))
+                state = goto[states[-1]][origin]
+                states.append(state)
+                if state == end and kind == END:
+                    return values[-1]
+            states.append(action)
+            values.append(token)
+            state = action
+            position = match.end()  # type: ignore[union-attr]
+
+    def accepted(self, stack: list[int]) -> frozenset[str]:
+        """The terminals that may follow where a stack of states stands."""
+        return frozenset(kind for kind in self._actions[stack[-1]] if self._accepts(stack, kind))
+
+    def _accepts(self, stack: list[int], kind: str) -> bool:
+        states = list(stack)
+        while True:
+            action = self._actions[states[-1]].get(kind)
+            if action is None:
+                return False
+            if action >= 0:
+                return True
+            size, origin, *_ = self._reductions[-1 - action]
+            if size:
+                del states[-size:]
+            states.append(self._goto[states[-1]][origin])
+            if states[-1] == self._end and kind == END:
+                return True
+
+    def _scanner(self, state: int) -> _Scanner:
+        """The scanner for the terminals that a state can take, made when first needed."""
+        kinds = frozenset(self._actions[state])
+        if kinds not in self._compiled:
+            choices = "|".join(
+                f"(?P<{kind}>{regex})" for kind, regex in self._terminals.items() if kind in kinds
+            )
+            self._compiled[kinds] = re.compile(rf"(?:{choices or '(?!)'})\s*", _FLAGS).match
+        self._scanners[state] = self._compiled[kinds]
+        return self._compiled[kinds]
+
+
+def _laid_open(children: list[Any], splice: tuple[int, ...]) -> list[Any]:
+    """The children, with the lists among them replaced by their items."""
+    if splice == (0,):
+        # A list rule is left-recursive: its list grows in place.
+        found: list[Any] = children[0]
+        found.extend(children[1:])
+        return found
+    found = []
+    for at, child in enumerate(children):
+        if at in splice:
+            found.extend(child)
+        else:
+            found.append(child)
+    return found

@@ -1,0 +1,193 @@
+"""Names, numbers and flat atoms from the text of a token.
+
+Most of a planning file is flat atoms, so these functions decide how fast files load. They fill the
+slots of the frozen nodes directly: the generated ``__init__`` of a frozen dataclass takes longer than
+all the rest.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextvars import ContextVar
+from typing import Any
+
+from bbtc.kleene import Truth
+from bbtc.source import SourceFile, Span
+from bbtc.syntax.ast import Assign, Atom, FluentRef, FluentValue, Name, Number, Term, TypedGroup, Variable
+from bbtc.syntax.engine import Token
+
+SOURCE: ContextVar[SourceFile] = ContextVar("SOURCE")
+"""The file that is being parsed: the builder's functions keep no state, but spans need it."""
+
+_new: Any = object.__new__
+_tuple: Any = tuple.__new__
+
+
+def _setter(node: type, slot: str) -> Any:
+    """Writes a slot of a frozen node."""
+    return getattr(node, slot).__set__
+
+
+_name_text, _name_span = _setter(Name, "text"), _setter(Name, "span")
+_variable_text, _variable_span = _setter(Variable, "text"), _setter(Variable, "span")
+_atom_predicate, _atom_args, _atom_span = (_setter(Atom, s) for s in ("predicate", "args", "span"))
+_assign_atom, _assign_value, _assign_span = (_setter(Assign, s) for s in ("atom", "value", "span"))
+
+_WORD = re.compile(r"\??[^\s()?]+")
+_GROUP = re.compile(r"([^\s-].*?)\s+-\s*(\S+)", re.DOTALL)
+_FACT = re.compile(r"\(([^()]*)\)|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
+
+NUMBER_LENGTH = 200
+"""Longest number, in characters."""
+EXPONENT_LIMIT = 300
+"""Largest decimal exponent of a number: its exact value must fit a small space."""
+_EXPONENT = re.compile(r"e[-+]?0*([0-9]+)$", re.IGNORECASE)
+_ZERO_DENOMINATOR = re.compile(r"/0+$")
+
+
+class Misuse(Exception):
+    """A form that fits the grammar's rules one by one but not together; reported like a syntax error."""
+
+    def __init__(
+        self, code: str, message: str, span: Span, hint: str | None = None, first: Span | None = None
+    ) -> None:
+        super().__init__(message)
+        self.code, self.message, self.span, self.hint, self.first = code, message, span, hint, first
+
+
+def of(token: Token) -> Span:
+    """The span of a token."""
+    return _tuple(Span, (SOURCE.get(), token.start, token.end))  # type: ignore[no-any-return]
+
+
+def between(first: Token, last: Token) -> Span:
+    """The span from the start of one token to the end of another."""
+    return _tuple(Span, (SOURCE.get(), first.start, last.end))  # type: ignore[no-any-return]
+
+
+def name(token: Token) -> Name:
+    """The symbol a token holds."""
+    return Name(token.text, of(token))
+
+
+def terms(text: str, offset: int, source: SourceFile) -> list[Term]:
+    """The words of a text that starts at an offset of the source, as names and variables."""
+    found: list[Term] = []
+    # The usual way to write an atom is one space between words, which str.split takes apart fast.
+    # Other white space and `robot?r` take the slow path.
+    if text.isprintable() and text.count("?") == text.count(" ?") + (text[0] == "?"):
+        at = offset
+        for word in text.split(" "):
+            if not word:
+                at += 1
+                continue
+            end = at + len(word)
+            if word[0] == "?":
+                node = _new(Variable)
+                _variable_text(node, word)
+                _variable_span(node, _tuple(Span, (source, at, end)))
+            else:
+                node = _new(Name)
+                _name_text(node, word)
+                _name_span(node, _tuple(Span, (source, at, end)))
+            found.append(node)
+            at = end + 1
+        return found
+    for match in _WORD.finditer(text):
+        word = match.group()
+        span = Span(source, offset + match.start(), offset + match.end())
+        found.append(Variable(word, span) if word[0] == "?" else Name(word, span))
+    return found
+
+
+def _flat(inner: str, span: Span) -> Atom:
+    """The atom ``(inner)`` that stands at a span."""
+    words = terms(inner, span[1] + 1, span[0])
+    node: Atom = _new(Atom)
+    _atom_predicate(node, words[0])
+    _atom_args(node, tuple(words[1:]))
+    _atom_span(node, span)
+    return node
+
+
+def flat(token: Token) -> Atom:
+    """The atom of a token ``(p a ?x)``."""
+    return _flat(token.text[1:-1], of(token))
+
+
+def atom(token: Token) -> Atom:
+    """The atom of a token ``(p a ?x)`` or ``p``."""
+    return flat(token) if token.kind == "FLAT" else Atom(name(token), (), of(token))
+
+
+def negated(token: Token) -> Atom:
+    """The atom within a token ``(not (p a))``."""
+    opening = token.text.index("(", 1)
+    inner = token.text[opening + 1 : token.text.index(")")]
+    start = token.start + opening
+    return _flat(inner, Span(SOURCE.get(), start, start + len(inner) + 2))
+
+
+def fluent(token: Token) -> FluentRef:
+    """The fluent of a token ``(f a)`` or ``f``."""
+    found = atom(token)
+    return FluentRef(found.predicate, found.args, found.span)
+
+
+def assign(fact: Atom, value: Truth, span: Span) -> Assign:
+    """The assignment of a value to an atom."""
+    node: Assign = _new(Assign)
+    _assign_atom(node, fact)
+    _assign_value(node, value)
+    _assign_span(node, span)
+    return node
+
+
+def facts(run: Token) -> Iterator[Assign | FluentValue]:
+    """The elements of a run of ground facts ``(p a)`` and values ``(= (f a) 3)``."""
+    source, base, true = SOURCE.get(), run.start, Truth.TRUE
+    for match in _FACT.finditer(run.text):
+        span = _tuple(Span, (source, base + match.start(), base + match.end()))
+        inner = match[1]
+        if inner is not None:
+            yield assign(_flat(inner, span), true, span)
+            continue
+        at = Span(source, base + match.start(2), base + match.end(2))
+        head = _flat(match[2][1:-1], at)
+        value = number(match[3], Span(source, base + match.start(3), base + match.end(3)))
+        yield FluentValue(FluentRef(head.predicate, head.args, at), value, span)
+
+
+def groups(run: Token) -> Iterator[TypedGroup]:
+    """The groups of a run ``a b - t c - u``."""
+    source, base = SOURCE.get(), run.start
+    for match in _GROUP.finditer(run.text):
+        start = base + match.start()
+        names = tuple(terms(match[1], start, source))
+        kind = Name(match[2], _tuple(Span, (source, base + match.start(2), base + match.end(2))))
+        yield TypedGroup(names, (kind,), Span(source, start, base + match.end(2)))
+
+
+def number(text: str, span: Span) -> Number:
+    """A number. Raises :class:`Misuse` if its exact value cannot be formed in a small space."""
+    if len(text) > 4 or "/" in text:
+        if _ZERO_DENOMINATOR.search(text):
+            raise Misuse("BBT0112", f"`{text[:40]}` divides by zero", span)
+        exponent = _EXPONENT.search(text)
+        huge = exponent is not None and (len(exponent[1]) > 4 or int(exponent[1]) > EXPONENT_LIMIT)
+        if huge or len(text) > NUMBER_LENGTH:
+            raise Misuse("BBT0113", f"number `{text[:40]}` has too many digits", span)
+    return Number(text, span)
+
+
+def plain_text(first: Token, last: Token) -> str:
+    """The source from one token to another on one line, without comments."""
+    source = SOURCE.get()
+    raw = _COMMENT.sub("", source.text[first.start : last.end])
+    return _PADDING.sub("", _SPACE.sub(" ", raw))
+
+
+_COMMENT = re.compile(r";[^\r\n]*")
+_SPACE = re.compile(r"\s+")
+_PADDING = re.compile(r"(?<=\() | (?=\))")
