@@ -126,7 +126,7 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
         if faults.attempt(members[field].string, expected) != expected:
             faults.add(members[field].fault("BBT0604", f"the tree's task is of the {field} '{expected}'"))
     faults.stop_if_any()
-    for problem in tree_problems(task, root):
+    for problem in tree_problems(tree):
         faults.add(problem_fault(problem, members["root"].path))
     return tree
 

@@ -46,13 +46,14 @@ def check_tree(tree: Tree) -> None:
     """Raise :class:`BbtcError` with every rule the tree breaks: ids are unique, control nodes have
     children, actions and variables exist in the task, only the last child of a Skipper contains
     actions, no more than :data:`MAX_DEPTH` levels."""
-    problems = [Diagnostic(p.code, p.message, hint=p.hint) for p in tree_problems(tree.task, tree.root)]
+    problems = [Diagnostic(p.code, p.message, hint=p.hint) for p in tree_problems(tree)]
     if problems:
         raise BbtcError(problems)
 
 
-def tree_problems(task: Task, root: Node) -> Iterator[Problem]:
-    """The rules that the tree under ``root`` breaks."""
+def tree_problems(tree: Tree) -> Iterator[Problem]:
+    """The rules that the tree breaks."""
+    task = tree.task
     ids: set[str] = set()
 
     def visit(node: Node, path: ChildPath) -> Iterator[Problem]:
@@ -71,7 +72,7 @@ def tree_problems(task: Task, root: Node) -> Iterator[Problem]:
             case _:
                 assert_never(node)
 
-    yield from _visit_node(root, (), visit)
+    yield from _visit_node(tree.root, (), visit)
 
 
 def _visit_node(
