@@ -18,6 +18,9 @@ CODES: dict[str, str] = {
     "BBT0008": "an artefact differs from what would be written",
     # 01xx: syntax
     "BBT0101": "syntax error",
+    "BBT0102": "parenthesis never closed",
+    "BBT0103": "closing parenthesis too many",
+    "BBT0104": "character that the language does not use",
     "BBT0110": "part given twice",
     "BBT0111": "part missing",
     "BBT0112": "division by zero",
@@ -84,4 +87,5 @@ CODES: dict[str, str] = {
     "BBT0703": "exporter cannot be loaded",
     "BBT0704": "wrong export option",
     "BBT0705": "tree too deep for the engine",
+    "BBT0706": "no program can draw the picture",
 }
