@@ -93,6 +93,8 @@ class Latch(Decorator):
             return
         ready = True if self._started or self._guard is None else self._guard()
         if ready:
+            if not self._started:
+                self._preempt()
             self.acting = self._started = True
             yield from self.decorated.tick()
             if self.decorated.status != Status.RUNNING:
@@ -109,6 +111,16 @@ class Latch(Decorator):
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID and self._started:
             self._end(Status.SUCCESS)
+
+    def _preempt(self) -> None:
+        # py_trees would interrupt the action that ran before only after this one has started: the
+        # robot, asked for the same action by both, could not tell the second from the first.
+        root: Behaviour = self
+        while root.parent is not None:
+            root = root.parent
+        for node in root.iterate():
+            if isinstance(node, Latch) and node is not self and node.status == Status.RUNNING:
+                node.stop(Status.INVALID)
 
     def _end(self, status: Status) -> None:
         self._started = False

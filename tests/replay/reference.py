@@ -1,0 +1,127 @@
+"""The semantics page as plainly as it can be written: the oracle of the oracle.
+
+Shares nothing with :mod:`bbtc.belief` but the data: its own Kleene tables, its own tick, one state
+at a time, and outcomes drawn from nowhere (any assignment may follow an action).
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, field
+
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+from tests.replay.script import Run, Script, Values
+
+AND = {"TT": "T", "TU": "U", "TF": "F", "UT": "U", "UU": "U", "UF": "F", "FT": "F", "FU": "F", "FF": "F"}
+OR = {"TT": "T", "TU": "T", "TF": "T", "UT": "T", "UU": "U", "UF": "U", "FT": "T", "FU": "U", "FF": "F"}
+NOT = {"T": "F", "U": "U", "F": "T"}
+STATUS = {"T": "success", "U": "running", "F": "failure"}
+GOES_ON = {"sequence": "success", "fallback": "failure", "skipper": "running"}
+
+
+def value_of(condition: Condition, values: Values) -> str:
+    """T, U or F."""
+    if isinstance(condition, Constant):
+        return "T" if condition.value else "F"
+    if isinstance(condition, Known):
+        return "F" if values[condition.variable] == 1 else "T"
+    if isinstance(condition, Is):
+        letter = "FUT"[values[condition.variable]]
+        if condition.value is Truth.UNKNOWN:
+            return "T" if letter == "U" else "F"
+        return letter if condition.value is Truth.TRUE else NOT[letter]
+    if isinstance(condition, Not):
+        return NOT[value_of(condition.part, values)]
+    result, table = ("T", AND) if isinstance(condition, And) else ("F", OR)
+    assert isinstance(condition, And | Or)
+    for part in condition.parts:
+        result = table[result + value_of(part, values)]
+    return result
+
+
+@dataclass
+class Ticking:
+    """One run of a tree: the values now, and the latched nodes that have finished."""
+
+    task: Task
+    values: Values
+    finished: set[str] = field(default_factory=set)
+    started: ActionNode | None = None
+
+    def tick(self, node: Node) -> str:
+        """The status a node returns; :attr:`started` is the action it started."""
+        if isinstance(node, ConditionNode):
+            return STATUS[value_of(node.condition, self.values)]
+        if isinstance(node, ActionNode):
+            if node.id in self.finished:
+                return "success"
+            if node.guarded:
+                allowed = value_of(self.task.action_by_name[node.action].precondition, self.values)
+                if allowed != "T":
+                    return STATUS[allowed]
+            assert self.started is None, "a tick starts at most one action"
+            self.started = node
+            return "running"
+        assert isinstance(node, ControlNode)
+        for child in node.children:
+            status = self.tick(child)
+            if status != GOES_ON[node.kind]:
+                return status
+        return GOES_ON[node.kind]
+
+    def started_now(self) -> ActionNode | None:
+        """The action the last tick started."""
+        return self.started
+
+
+def varied_runs(task: Task, root: Node, seed: int, keep: int = 8, most: int = 8) -> list[tuple[Script, Run]]:
+    """Up to ``keep`` different runs of a tree: of many random ones those with the most actions, and
+    two short ones. Empty for a tree that hardly ever acts."""
+    rng = random.Random(seed)
+    runs = dict.fromkeys(random_run(task, root, rng, most) for _ in range(5 * keep))
+    ordered = sorted(runs, key=lambda made: -len(made[0].steps))
+    if len(ordered[0][0].steps) < 2:
+        return []
+    return [*ordered[: keep - 2], *ordered[keep - 2 :][-2:]]
+
+
+def random_run(task: Task, root: Node, rng: random.Random, most: int) -> tuple[Script, Run]:
+    """A run with random outcomes, cut when it starts more than ``most`` actions."""
+    run = Ticking(task, ())
+    run.values = initial = _lively_values(run, root, rng)
+    steps: list[tuple[str, Values]] = []
+    while True:
+        run.started = None
+        status = run.tick(root)
+        names = tuple(name for name, _ in steps)
+        started = run.started_now()
+        if started is None:
+            ended = Run(names, "success" if status == "success" else "failure", run.values)
+            return Script(initial, tuple(steps)), ended
+        assert status == "running"
+        if len(steps) == most:
+            return Script(initial, tuple(steps)), Run((*names, started.action), "cut", run.values)
+        if started.latched:
+            run.finished.add(started.id)
+        run.values = _lively_values(run, root, rng)
+        steps.append((started.action, run.values))
+
+
+def _lively_values(run: Ticking, root: Node, rng: random.Random) -> Values:
+    # Random outcomes end a tree soon: of a few, take one that keeps it going, most of the time.
+    for _ in range(rng.choice([1, 6, 6, 6])):
+        values = _random_values(run.task, rng, run.values)
+        ahead = Ticking(run.task, values, run.finished)
+        ahead.tick(root)
+        if ahead.started is not None:
+            break
+    return values
+
+
+def _random_values(task: Task, rng: random.Random, before: Values) -> Values:
+    """Any assignment; after another one, one that keeps about half of it."""
+    drawn = tuple(int(rng.choice(variable.values)) for variable in task.variables)
+    return tuple(rng.choice(pair) for pair in zip(before, drawn, strict=True)) if before else drawn
