@@ -36,11 +36,12 @@ def refinement_line(number: int, step: Refinement) -> list[str]:
         what = f"move the branch of {step.inserted}, which undid it, before it"
     else:
         verb = "observe" if step.value is Truth.UNKNOWN else "achieve"
-        chance = exact(step.chance) if step.chance is not None else "?"
-        unmet = (
-            f", after {step.unmet} precondition{'s' * (step.unmet != 1)} not yet met" if step.unmet else ""
-        )
-        what = f"insert {step.inserted} to {verb} it (with probability {chance}{unmet})"
+        chances = [f"with probability {exact(step.chance)}"] if step.chance else []
+        if step.open:
+            chances.append(f"to be observed with probability {exact(step.open)}")
+        if step.unmet:
+            chances.append(f"after {counted(step.unmet, 'precondition')} not yet met")
+        what = f"insert {step.inserted} to {verb} it ({', '.join(chances)})"
     return [f"{number:3d}. {why}", f"     {what}", f"     success {exact(step.success)}, {step.nodes} nodes"]
 
 

@@ -17,6 +17,9 @@ from bbtc.kleene import Truth
 from bbtc.plan.draft import Doing, Subgoal, changed_by
 from bbtc.plan.relaxed import RelaxedReachability, effects_of, possible
 
+OPEN_SHARE = Fraction(1, 2)
+"""An outcome that leaves a false condition unknown counts this much: it may still be observed true."""
+
 UNMET_DISCOUNT = Fraction(4, 5)
 """A candidate's score is multiplied by this for every precondition that does not hold yet."""
 
@@ -42,12 +45,14 @@ class Target:
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """Something that may resolve a target. ``success`` is the probability that the condition
-    holds (is known, where it was unknown) after it, over the target's states; ``conditions`` are
-    what must hold first; ``unmet`` counts those that do not hold in some of the states."""
+    holds (is known, where it was unknown) after it, over the target's states, ``open`` that it
+    becomes unknown where it was false; ``conditions`` are what must hold first; ``unmet`` counts
+    those that do not hold in some of the states."""
 
     doing: Doing | None
     conditions: tuple[Condition, ...]
     success: Fraction
+    open: Fraction
     unmet: int
     tried: int
 
@@ -59,7 +64,7 @@ class Candidate:
     @property
     def score(self) -> Fraction:
         """Probability of success, discounted for every unmet precondition."""
-        return self.success * UNMET_DISCOUNT**self.unmet
+        return (self.success + self.open * OPEN_SHARE) * UNMET_DISCOUNT**self.unmet
 
     def rank(self) -> tuple[Fraction, int, Fraction, str]:
         """Sort key, best first: score, fewest tries, cost, name."""
@@ -113,11 +118,10 @@ class Chooser:
         if not states:
             return
         tried = sum(a.doing is doing for a in target.subgoal.attempts())
-        success = self._success(doing, target, {}, states)
-        if success:
-            yield Candidate(
-                doing, self._inserted(doing, conditions), success, _unmet(conditions, states), tried
-            )
+        chances = self._chances(doing, target, {}, states)
+        if any(chances):
+            inserted = self._inserted(doing, conditions)
+            yield Candidate(doing, inserted, *chances, _unmet(conditions, states), tried)
             return
         for guard in _guards(doing, frozenset(variables(goal))):
             more = (*conditions, *(c for c in conjuncts(guard) if c not in conditions))
@@ -126,10 +130,10 @@ class Chooser:
             reachable = [(s, p) for s, p in states if self._applicable(more, s)]
             forced = _forced(guard)
             if reachable and forced is not None:
-                success = self._success(doing, target, forced, reachable)
-                if success:
+                chances = self._chances(doing, target, forced, reachable)
+                if any(chances):
                     inserted = self._inserted(doing, more)
-                    yield Candidate(doing, inserted, success, _unmet(more, reachable), tried)
+                    yield Candidate(doing, inserted, *chances, _unmet(more, reachable), tried)
 
     def _inserted(self, doing: Doing, conditions: tuple[Condition, ...]) -> tuple[Condition, ...]:
         """The preconditions that stand before the doing in the tree. Those a template's body can
@@ -143,26 +147,31 @@ class Chooser:
         facts = self.reachability.facts(state.values)
         return all(possible(condition, facts) for condition in conditions)
 
-    def _success(
+    def _chances(
         self,
         doing: Doing,
         target: Target,
         forced: Mapping[int, Truth],
         states: list[tuple[State, Fraction]],
-    ) -> Fraction:
-        """Probability, given the states, that the doing makes the goal true (known, if it was
-        unknown), with some variables forced to the values that its guard asks for."""
+    ) -> tuple[Fraction, Fraction]:
+        """Probabilities, given the states, that the doing makes the goal true (known, if it was
+        unknown), and that it leaves it to be observed, with some variables forced to the values
+        that its guard asks for."""
         transition = self._transition(doing)
-        total = Fraction(0)
+        success = observable = Fraction(0)
+        goal = target.subgoal.condition
         for state, probability in states:
             values = bytearray(state.values)
             for variable, value in forced.items():
                 values[variable] = value
+            may_hold = possible(goal, self.reachability.facts(state.values))
             for result in transition(bytes(values)):
-                after = evaluate(target.subgoal.condition, result.values)
+                after = evaluate(goal, result.values)
                 if after is Truth.TRUE or (target.value is Truth.UNKNOWN and after is Truth.FALSE):
-                    total += probability * result.probability
-        return total / target.probability
+                    success += probability * result.probability
+                elif after is Truth.UNKNOWN and target.value is Truth.FALSE and may_hold:
+                    observable += probability * result.probability
+        return success / target.probability, observable / target.probability
 
     def _transition(self, doing: Doing) -> Transition:
         store = self.transitions if isinstance(doing, GroundAction) else self._guides
@@ -190,7 +199,7 @@ class Chooser:
             states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
             if states and frozenset(conditions) not in tried:
                 share = sum((p for _, p in states), Fraction(0)) / target.probability
-                yield Candidate(None, conditions, share, _unmet(conditions, states), 0)
+                yield Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
 
 
 def _circular(condition: Condition, goal: Condition, value: Truth) -> bool:

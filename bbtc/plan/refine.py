@@ -144,12 +144,12 @@ class _Refiner:
             if threat is not None:
                 self.moved.add((threat.siblings[threat.earlier], threat.siblings[threat.later]))
                 threat.resolve()
-                return Refinement("move", *common, threat.action, None, 0, Fraction(0), 0)
+                return Refinement("move", *common, threat.action)
             candidates = self.chooser.candidates(target)
             if candidates:
                 best = candidates[0]
                 self.insert(target, best)
-                return Refinement("insert", *common, best.name, best.success, best.unmet, Fraction(0), 0)
+                return Refinement("insert", *common, best.name, best.success, best.open, best.unmet)
             self.closed.add((target.subgoal, target.value))
         return None
 

@@ -20,8 +20,9 @@ class Refinement:
     """One step of a planner: what stopped the runs, what was done about it, what came of it.
 
     ``condition`` was ``value`` in runs of total probability ``probability``; ``inserted`` names
-    the action or template inserted (None for a move), which makes the condition hold with
-    probability ``chance`` once its preconditions hold, ``unmet`` of which did not hold yet.
+    the action or template inserted, or whose branch was moved; once its preconditions hold,
+    ``unmet`` of which did not hold yet, it makes the condition hold (known, if it was unknown) with
+    probability ``chance``, and unknown, so that it can be observed, with ``open``.
     ``success`` is the tree's success probability afterwards.
     """
 
@@ -29,11 +30,12 @@ class Refinement:
     condition: str
     value: Truth
     probability: Fraction
-    inserted: str | None
-    chance: Fraction | None
-    unmet: int
-    success: Fraction
-    nodes: int
+    inserted: str
+    chance: Fraction = Fraction(0)
+    open: Fraction = Fraction(0)
+    unmet: int = 0
+    success: Fraction = Fraction(0)
+    nodes: int = 0
 
 
 Progress: TypeAlias = Callable[[Refinement], None]

@@ -44,7 +44,9 @@ def find_threat(
     subgoal = target.subgoal
     while True:
         siblings = subgoal.parent.preconditions if subgoal.parent is not None else draft.goals
-        earlier = next(i for i, sibling in enumerate(siblings) if sibling is subgoal)
+        # (A precondition found missing stands among its siblings only once it is resolved.)
+        places = [place for place, sibling in enumerate(siblings) if sibling is subgoal]
+        earlier = places[0] if places else len(siblings)
         for later in range(earlier + 1, len(siblings)):
             pair = (subgoal, siblings[later])
             if pair in moved or pair[::-1] in moved:
