@@ -17,8 +17,9 @@ def prune(task: gt.Task) -> gt.Task:
     actions and templates that change nothing that matters.
 
     Backward relevance: the goal's variables matter; what sets a variable that matters is kept, and
-    with it the variables its precondition and guards read. A template is kept if its guide sets, or
-    its body contains an action that sets, a variable that matters; then all its body is kept.
+    with it the variables its precondition and guards read. A template is kept if its guide sets a
+    variable that matters (only its guide makes a planner insert it), or if a kept one calls it;
+    then all its body is kept.
     Outcomes that become equal are merged. Under a reward metric actions with rewards are kept too.
     """
     relevance = _Relevance(task)
@@ -68,17 +69,9 @@ class _Relevance:
         for index, action in enumerate(task.actions):
             for guard, variable in _settings(action.factors):
                 self._action_setters.setdefault(variable, []).append((index, guard))
-        self._callers: dict[int, list[int]] = {}
-        self._including: dict[int, list[int]] = {}
         for index, template in enumerate(task.templates):
             for guard, variable in _settings(template.factors):
                 self._template_setters.setdefault(variable, []).append((index, guard))
-            for part in _body_parts(template.body):
-                if isinstance(part, gt.BodyAction):
-                    self._callers.setdefault(self._action_index[part.action], []).append(index)
-                elif isinstance(part, gt.BodyTemplate):
-                    called = self._template_index[part.template]
-                    self._including.setdefault(called, []).append(index)
 
     def close(self) -> None:
         """Start from the goal (and rewards, if they are the metric) and follow everything up."""
@@ -107,8 +100,6 @@ class _Relevance:
         if index not in self.actions:
             self.actions.add(index)
             self._read(self.task.actions[index].precondition)
-            for caller in self._callers.get(index, ()):
-                self._keep_template(caller)
 
     def _keep_template(self, index: int) -> None:
         todo = [index]
@@ -119,7 +110,6 @@ class _Relevance:
             self.templates.add(current)
             template = self.task.templates[current]
             self._read(template.precondition)
-            todo.extend(self._including.get(current, ()))
             for part in _body_parts(template.body):
                 match part:
                     case gt.BodyCondition(condition):
