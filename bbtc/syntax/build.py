@@ -10,6 +10,7 @@ from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax import ast, leaves
 from bbtc.syntax.engine import Token
+from bbtc.syntax.hints import CONNECTIVES, nearest
 from bbtc.syntax.leaves import SOURCE, Misuse, between, of
 
 _WORD = re.compile(r"\??[^\s()?]+")
@@ -95,6 +96,17 @@ def _parameters(entries: ast.TypedList, last: Token) -> ast.TypedList:
                 )
             )
     return tuple(groups)
+
+
+def _expression(operand: Any) -> ast.NumericExpression | None:
+    """An operand as a numeric expression, if it is one."""
+    match operand:
+        case ast.Number() | ast.FluentRef() | ast.Arithmetic():
+            return operand
+        case ast.Name():
+            return ast.FluentRef(operand, (), operand.span)
+        case _:
+            return None
 
 
 class Builder:
@@ -295,22 +307,38 @@ class Builder:
         return ast.GoalNumber(kind, _number(number), between(head, close))
 
     def metric(self, children: list[Any]) -> ast.Metric:
-        head, direction, expression, close = children
+        head, direction, operand, close = children
         way: Any = direction.text.lower()
+        expression = _expression(operand)
+        if expression is None:
+            raise Misuse("BBT0101", "the metric is no numeric expression", between(head, close))
         return ast.Metric(way, expression, between(head, close))
 
     def facts(self, children: list[Any]) -> list[ast.InitElement]:
         return list(leaves.facts(children[0]))
 
-    def fluent_value(self, children: list[Any]) -> ast.FluentValue:
-        head, fluent, number, close = children
-        return ast.FluentValue(fluent, _number(number), between(head, close))
+    def fluent_value(self, children: list[Any]) -> ast.FluentValue | ast.Unsupported:
+        head, left, right, close = children
+        fluent = _expression(left)
+        if isinstance(fluent, ast.FluentRef) and isinstance(right, ast.Number):
+            return ast.FluentValue(fluent, right, between(head, close))
+        return _unsupported("object fluent", head, close)
 
     def init_and(self, children: list[Any]) -> ast.InitAnd:
         return ast.InitAnd(_spliced(children[1:-1]), between(children[0], children[-1]))
 
     def init_or(self, children: list[Any]) -> ast.InitClause:
         clause = self.disjunction(children)
+        return ast.InitClause(clause, clause.span)
+
+    def init_imply(self, children: list[Any]) -> ast.InitClause:
+        clause = self.implication(children)
+        return ast.InitClause(clause, clause.span)
+
+    def init_not(self, children: list[Any]) -> ast.InitClause | ast.Assign:
+        clause = self.negation(children)
+        if isinstance(clause.part, ast.Atom):
+            return leaves.assign(clause.part, Truth.FALSE, clause.span)
         return ast.InitClause(clause, clause.span)
 
     def invariant(self, children: list[Any]) -> ast.Invariant:
@@ -421,11 +449,14 @@ class Builder:
     def one_of(self, children: list[Any]) -> ast.OneOf:
         return ast.OneOf(tuple(children[1:-1]), between(children[0], children[-1]))
 
-    def fluent_effect(self, children: list[Any]) -> ast.FluentEffect:
-        head, fluent, amount, close = children
-        return ast.FluentEffect(_keyword(head), fluent, amount, between(head, close))
+    def fluent_effect(self, children: list[Any]) -> ast.FluentEffect | ast.Unsupported:
+        head, target, amount, close = children
+        fluent, expression = _expression(target), _expression(amount)
+        if isinstance(fluent, ast.FluentRef) and expression is not None:
+            return ast.FluentEffect(_keyword(head), fluent, expression, between(head, close))
+        return _unsupported("object fluent", head, close)
 
-    # --- numbers -----------------------------------------------------------------------------
+    # --- terms and numbers -------------------------------------------------------------------
 
     def number(self, children: list[Any]) -> ast.Number:
         return _number(children[0])
@@ -433,9 +464,20 @@ class Builder:
     def fluent(self, children: list[Any]) -> ast.FluentRef:
         return leaves.fluent(children[0])
 
-    def arithmetic(self, children: list[Any]) -> ast.Arithmetic:
+    def arithmetic(self, children: list[Any]) -> ast.Arithmetic | ast.Unsupported:
         head, *operands, close = children
-        return ast.Arithmetic(_keyword(head), tuple(operands), between(head, close))
+        parts = [_expression(operand) for operand in operands]
+        if None in parts:
+            return _unsupported("arithmetic on objects", head, close)
+        return ast.Arithmetic(_keyword(head), tuple(p for p in parts if p), between(head, close))
+
+    def nested(self, children: list[Any]) -> ast.Unsupported:
+        """An atom whose arguments are no plain terms: an object fluent, or a misspelt keyword."""
+        word = _keyword(children[0])
+        near = nearest(word, CONNECTIVES)
+        if near is not None:
+            raise Misuse("BBT0101", f"`{word}` is no keyword", of(children[0]), f"did you mean `{near}`?")
+        return _unsupported("object fluent", children[0], children[-1])
 
     # --- bodies ------------------------------------------------------------------------------
 

@@ -137,7 +137,7 @@ class Engine:
             )
             for p in tables.productions
         ]
-        self._terminals = tables.terminals
+        self.terminals = tables.terminals
         self._scanners: dict[int, _Scanner] = {}
         self._compiled: dict[frozenset[str], _Scanner] = {}
 
@@ -209,7 +209,7 @@ class Engine:
         kinds = frozenset(self._actions[state])
         if kinds not in self._compiled:
             choices = "|".join(
-                f"(?P<{kind}>{regex})" for kind, regex in self._terminals.items() if kind in kinds
+                f"(?P<{kind}>{regex})" for kind, regex in self.terminals.items() if kind in kinds
             )
             self._compiled[kinds] = re.compile(rf"(?:{choices or '(?!)'})\s*", _FLAGS).match
         self._scanners[state] = self._compiled[kinds]

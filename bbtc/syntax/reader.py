@@ -18,9 +18,9 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 def read_source(path: str, max_bytes: int = MAX_BYTES) -> SourceFile:
-    """The text of a file, or of standard input for ``-``.
+    """The text of a file, or of standard input for ``-``, with Unix line ends.
 
-    Line ends become ``\\n``. Raises :class:`BbtcError` for a file that cannot be read, is larger than
+    Raises :class:`BbtcError` for a file that cannot be read, is larger than
     ``max_bytes``, is not text, or is empty.
     """
     name = "<stdin>" if path == "-" else path

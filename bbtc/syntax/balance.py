@@ -1,0 +1,191 @@
+"""Where parentheses are missing or too many.
+
+A missing parenthesis shows at the end of the file only, far from the mistake. But a section such as
+``(:action`` stands right in a definition, and a field such as ``:effect`` right in its section: where
+one of them stands deeper, something before it is not closed; where a section stands outside a definition,
+something before it closes too much. The layout tells more: a parenthesis that starts a line closes what
+starts with the same indentation.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from bbtc.syntax.scan import Fault, blank
+
+# A parenthesis with the word after it, or a field.
+_MARK = re.compile(r"\(\s*([^\s()?]*)|\)|(?<![^\s()]):[a-z-]+", re.IGNORECASE | re.ASCII)
+_SECTIONS = frozenset(
+    (
+        *(":requirements", ":types", ":constants", ":predicates", ":functions"),
+        *(":action", ":derived", ":axiom", ":sensor", ":template", ":durative-action", ":constraints"),
+        *(":domain", ":objects", ":init", ":hidden", ":goal", ":goal-probability", ":goal-reward", ":metric"),
+    )
+)
+_FIELDS = {
+    ":action": frozenset((":parameters", ":precondition", ":observe", ":effect")),
+    ":template": frozenset((":parameters", ":precondition", ":effect", ":body")),
+    ":sensor": frozenset((":parameters", ":condition", ":sensed")),
+    ":axiom": frozenset((":parameters", ":vars", ":context", ":body", ":implies", ":head")),
+}
+
+
+class Opener(NamedTuple):
+    """An opening parenthesis, the word after it in lower case, the white space before its line, and
+    its column."""
+
+    start: int
+    word: str
+    indent: str
+    column: int
+
+    @property
+    def shown(self) -> str:
+        """As a message names it."""
+        return f"`({self.word}`"
+
+
+class Extra(NamedTuple):
+    """A closing parenthesis too many, and the last section before it."""
+
+    fault: int
+    section: int
+    start: int
+
+
+@dataclass(slots=True)
+class Balance:
+    """The unbalanced parentheses of a text, and the text with the sections that hold them blanked."""
+
+    text: str
+    faults: list[Fault] = field(default_factory=list)
+    extras: list[Extra] = field(default_factory=list)
+    _edited: bytearray = field(default_factory=bytearray)
+    _stack: list[Opener] = field(default_factory=list)
+    _suspect: Opener | None = None
+    _closed: Opener | None = None
+    _closed_at: int = 0
+    _section: int = 0
+    _closed_section: Opener | None = None
+    _section_end: int = 0
+    _broken: bool = False
+    _surplus: int = 0
+
+    def run(self) -> Balance:
+        """Go through the text once, in linear time."""
+        text = self.text
+        self._edited = bytearray(text, "ascii")
+        for match in _MARK.finditer(text):
+            start = match.start()
+            if text[start] == ")":
+                self._close(start)
+            elif text[start] == "(":
+                self._open(start, match[1].lower())
+            else:
+                self._field(start, match.group().lower())
+        if self._stack:
+            self._end()
+        self.text = self._edited.decode("ascii")
+        return self
+
+    def _open(self, start: int, word: str) -> None:
+        stack = self._stack
+        if word == "define" and stack:
+            self._unclosed(stack if len(stack) == 1 else stack[1:], start, "`(define`")
+            blank(self._edited, stack[1].start if len(stack) > 1 else start, start)
+            if self._edited[start - 1 : start].isspace():
+                self._edited[start - 1 : start] = b")"
+            else:
+                blank(self._edited, stack[0].start, start)
+            stack.clear()
+        elif word in _SECTIONS and len(stack) > 1:
+            self._misplaced_section(start, word)
+        elif word in _SECTIONS and not stack and self._closed is not None:
+            # Only a parenthesis too many can have closed the definition before this section.
+            self._extra(self._closed_at, f"closes the definition before `({word}`")
+            stack.append(self._closed)
+        if len(stack) == 1:
+            self._section, self._suspect, self._broken = start, None, False
+        line = self.text.rfind("\n", 0, start) + 1
+        before = self.text[line:start]
+        stack.append(Opener(start, word, before[: len(before) - len(before.lstrip())], len(before)))
+
+    def _misplaced_section(self, start: int, word: str) -> None:
+        outer = self._stack[1]
+        if outer.word.startswith(":"):
+            self._unclosed(self._stack[1:], start, f"`({word}`")
+            blank(self._edited, outer.start, start)
+        else:
+            message = f"{outer.shown} cannot stand here: a definition holds sections such as `(:action`"
+            self.faults.append(Fault("BBT0101", message, outer.start, outer.start + 1 + len(outer.word)))
+            blank(self._edited, outer.start, start)
+            self._surplus += len(self._stack) - 1
+        del self._stack[1:]
+
+    def _field(self, start: int, word: str) -> None:
+        stack, closed = self._stack, self._closed_section
+        if len(stack) > 2 and word in _FIELDS.get(stack[1].word, ()):
+            self._unclosed(stack[2:], start, f"`{word}`")
+            self._broken = True
+            del stack[2:]
+        elif len(stack) == 1 and closed is not None and word in _FIELDS.get(closed.word, ()):
+            self._extra(self._section_end, f"closes {closed.shown} before `{word}`")
+            stack.append(closed)
+
+    def _close(self, start: int) -> None:
+        if not self._stack:
+            blank(self._edited, start, start + 1)
+            if self._surplus:
+                self._surplus -= 1
+            elif not self.extras or self.text[self.extras[-1].start + 1 : start].strip(") \t\r\n"):
+                self._extra(start, "closes nothing")
+            return
+        opener = self._stack.pop()
+        line = self.text.rfind("\n", 0, start) + 1
+        before = self.text[line:start]
+        aligned = before in (opener.indent, " " * opener.column)
+        if self._suspect is None and not before.strip() and not aligned and len(self._stack) > 0:
+            outer = [o for o in self._stack if before in (o.indent, " " * o.column)]
+            if outer and opener.start < line:
+                self._suspect = opener
+        if len(self._stack) == 1:
+            self._closed_section, self._section_end = opener, start
+            if self._broken:
+                blank(self._edited, opener.start, start + 1)
+        elif not self._stack and opener.word == "define":
+            self._closed, self._closed_at = opener, start
+
+    def _end(self) -> None:
+        stack, end = self._stack, len(self.text)
+        if len(stack) > 1 or self._suspect is not None:
+            group = stack[1:] or stack
+            if stack[0].word == "define" and len(stack) > 1:
+                blank(self._edited, stack[1].start, end)
+            elif self._suspect is not None:
+                blank(self._edited, self._section, end)
+        else:
+            group = stack
+        self._unclosed(group, end, "the file ends")
+        if stack[0].word == "define":
+            self._edited += b")"
+        else:
+            blank(self._edited, stack[0].start, end)
+
+    def _unclosed(self, group: list[Opener], at: int, found: str) -> None:
+        place = group[-1]
+        if self._suspect is not None and self._suspect.start >= self._section:
+            place = self._suspect
+        self._suspect = None
+        related = (f"still open where {found} starts", at, at + 1) if at < len(self.text) else None
+        end = place.start + 1 + len(place.word)
+        self.faults.append(
+            Fault("BBT0102", f"{place.shown} is never closed", place.start, end, None, related)
+        )
+
+    def _extra(self, start: int, why: str) -> None:
+        blank(self._edited, start, start + 1)
+        self.extras.append(Extra(len(self.faults), self._section, start))
+        message = f"this parenthesis {why}"
+        self.faults.append(Fault("BBT0103", message, start, start + 1, "remove it, or open one before it"))

@@ -1,0 +1,76 @@
+"""What is seen in a text before it is parsed: comments, depth of nesting, characters that no name holds."""
+
+from __future__ import annotations
+
+import re
+from itertools import accumulate
+from typing import NamedTuple
+
+from bbtc.source import SourceFile, Span
+from bbtc.syntax.ast import Comment
+
+_COMMENT = re.compile(r";[^\r\n]*")
+_NOT_PARENTHESES = re.compile(r"[^()]+")
+_STEP = {"(": 1, ")": -1}
+_FOREIGN = re.compile(r"[^ \t\r\n\f\v()a-zA-Z0-9_.*+@#$%!~?:=<>/-]+")
+
+
+class Fault(NamedTuple):
+    """An error found in a text: code, message, range, hint, and a second place with its message."""
+
+    code: str
+    message: str
+    start: int
+    end: int
+    hint: str | None = None
+    related: tuple[str, int, int] | None = None
+
+
+def comments(source: SourceFile) -> tuple[Comment, ...]:
+    """The comments of a file, in order."""
+    text = source.text
+    found = []
+    for match in _COMMENT.finditer(text):
+        start = match.start()
+        line = max(text.rfind("\n", 0, start), text.rfind("\r", 0, start)) + 1
+        content = match.group().rstrip()
+        span = Span(source, start, start + len(content))
+        found.append(Comment(content, not text[line:start].strip(), span))
+    return tuple(found)
+
+
+def without_comments(text: str) -> str:
+    """The text, as long as before, with spaces for comments."""
+    return _COMMENT.sub(lambda match: " " * len(match.group()), text) if ";" in text else text
+
+
+def too_deep(text: str, limit: int) -> int | None:
+    """Offset of the first parenthesis that is nested deeper than a limit."""
+    # What nearly every file passes runs without a loop in Python.
+    parentheses = _NOT_PARENTHESES.sub("", text)
+    if max(accumulate(map(_STEP.__getitem__, parentheses)), default=0) <= limit:
+        return None
+    depth = 0
+    for match in re.finditer(r"[()]", text):
+        # A closing parenthesis too many counts for nothing: it is reported elsewhere.
+        depth = max(0, depth + _STEP[match.group()])
+        if depth > limit:
+            return match.start()
+    return None
+
+
+def foreign_characters(text: str) -> tuple[list[Fault], str]:
+    """The places where characters stand that the language does not use, and the text with an
+    underscore for each of these."""
+    faults = []
+    for match in _FOREIGN.finditer(text):
+        shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in match.group()[:10])
+        what = f"characters `{shown}`" if len(match.group()) > 1 else f"character `{shown}`"
+        hint = "names hold letters, digits and _ - . * + @ # $ % ! ~"
+        faults.append(Fault("BBT0104", f"{what} cannot stand here", *match.span(), hint))
+    return faults, _FOREIGN.sub(lambda match: "_" * len(match.group()), text) if faults else text
+
+
+def blank(text: bytearray, start: int, end: int) -> None:
+    """Write spaces over everything in a range but line ends."""
+    text[start:end] = re.sub(rb"[^\r\n]", b" ", bytes(text[start:end]))
