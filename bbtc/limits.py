@@ -13,13 +13,27 @@ class Limits:
     """Bounds for one run; ``None`` means no bound.
 
     ``seconds`` counts from the moment the object is made. ``states`` bounds the physical states
-    of one simulation, ``nodes`` the nodes of a tree.
+    of one simulation, ``nodes`` the nodes of a tree. Of grounding, ``actions`` bounds the ground
+    actions and templates, ``facts`` everything that the reachability analysis derives,
+    ``memory`` the bytes its engine may take, ``initial_states`` what a draw in ``:init`` is spelled
+    out into.
     """
 
     seconds: float | None = None
     states: int = 1_000_000
     nodes: int = 10_000
+    actions: int = 2_000_000
+    facts: int = 10_000_000
+    memory: int | None = 4 << 30
+    initial_states: int = 256
     _start: float = field(default_factory=time.monotonic, compare=False, repr=False)
+
+    @property
+    def remaining(self) -> float | None:
+        """Seconds left, not below 0; None without a bound."""
+        if self.seconds is None:
+            return None
+        return max(0.0, self._start + self.seconds - time.monotonic())
 
     def check_time(self, doing: str) -> None:
         """Raise :class:`LimitReached` once the time is over."""
@@ -37,6 +51,16 @@ class Limits:
         """Raise :class:`LimitReached` if a tree of ``count`` nodes is too large."""
         if count > self.nodes:
             raise self.reached(f"the limit of {self.nodes} tree nodes ended planning", "--max-nodes")
+
+    def check_actions(self, count: int) -> None:
+        """Raise :class:`LimitReached` if ``count`` ground actions and templates are too many."""
+        if count > self.actions:
+            raise self.reached(f"the limit of {self.actions} ground actions was met", "--max-ground-actions")
+
+    def check_facts(self, count: int) -> None:
+        """Raise :class:`LimitReached` if ``count`` derived facts are too many."""
+        if count > self.facts:
+            raise self.reached(f"the limit of {self.facts} derived facts ended grounding", "--max-facts")
 
     @staticmethod
     def reached(message: str, option: str) -> LimitReached:

@@ -68,12 +68,39 @@ def _types(names: Names, domain: ast.Definition) -> TypeHierarchy:
     for above in list(parents.values()):
         for key, parent in above.items():
             found.setdefault(key, Type(key, (), parent.span))
+    if not parents:
+        _implied(names, domain, found)
     found[OBJECT] = Type(OBJECT, (), found[OBJECT].span if OBJECT in found else None)
     parents[OBJECT] = {}
     _refuse_cycles(names, parents, found)
     return TypeHierarchy(
         {key: Type(key, tuple(parents.get(key, ())), type_.span) for key, type_ in found.items()}
     )
+
+
+def _implied(names: Names, domain: ast.Definition, found: dict[str, Type]) -> None:
+    """A domain without any ``:types`` that uses types all the same: each is read as declared."""
+    groups: list[ast.TypedGroup] = []
+    for section in domain.sections:
+        match section:
+            case ast.TypedSection(_, entries):
+                groups.extend(entries)
+            case ast.Predicates(declarations):
+                groups.extend(group for each in declarations for group in each.parameters)
+            case ast.Action() | ast.Template():
+                groups.extend(section.parameters)
+            case _:
+                pass
+    for group in groups:
+        for name in group.types:
+            if name.key != OBJECT and name.key not in found:
+                found[name.key] = Type(name.key, (), name.span)
+                names.report.warning(
+                    "BBT0201",
+                    f"type `{name.text}` is not declared",
+                    name.span,
+                    "the domain has no `:types`, so every type that it uses is taken as one",
+                )
 
 
 def _refuse_cycles(names: Names, parents: dict[str, dict[str, ast.Name]], found: dict[str, Type]) -> None:
@@ -118,7 +145,9 @@ def _objects(names: Names, section: ast.TypedSection) -> None:
             if before is None:
                 objects[key] = Object(key, types, name.span)
             else:
-                twice(names.report, kind, name, before, harmless=before.types == types)
+                # Some problems list an object again with a further type: it is of both.
+                twice(names.report, kind, name, before, harmless=True)
+                objects[key] = Object(key, tuple(dict.fromkeys((*before.types, *types))), before.span)
 
 
 def _predicates(names: Names, domain: ast.Definition) -> None:

@@ -156,7 +156,7 @@ class Names:
             found = self.term(arg, scope)
             if found is None:
                 continue
-            if not self._fits(found[1], parameter.types, isinstance(arg, ast.Name)):
+            if not self._fits(arg, found[1], parameter.types):
                 self.report.error(
                     "BBT0207",
                     f"argument {position} of {kind} `{shown}` must be {type_words(parameter.types)}, "
@@ -168,14 +168,14 @@ class Names:
             result.append(found[0])
         return tuple(result) if len(result) == len(args) else None
 
-    def _fits(self, given: tuple[str, ...], wanted: tuple[str, ...], is_object: bool) -> bool:
+    def _fits(self, arg: ast.Term, given: tuple[str, ...], wanted: tuple[str, ...]) -> bool:
         """An object must be of the wanted type. A parameter may be of a more general one, as in
         many public files: its bindings decide."""
         if wanted in {given, (OBJECT,)}:
             return True
-        if is_object and self.hierarchy.fits(given, wanted):
-            return True
-        return self.hierarchy.overlaps(given, wanted) and not (is_object and len(given) == 1)
+        if isinstance(arg, ast.Name):
+            return self.hierarchy.contains(wanted, self.objects[arg.key])
+        return self.hierarchy.overlaps(given, wanted)
 
     # --- numbers -------------------------------------------------------------------------
 

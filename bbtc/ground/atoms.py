@@ -91,7 +91,7 @@ class Atoms:
             self._members[types] = [
                 index
                 for index, each in enumerate(self.model.objects.values())
-                if any(hierarchy.is_subtype(name, types) for name in each.types)
+                if hierarchy.contains(types, each)
             ]
         return self._members[types]
 

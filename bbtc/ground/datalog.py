@@ -11,12 +11,10 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from bbtc.diagnostics import LimitReached
-from bbtc.ground.limits import GroundLimits
+from bbtc.limits import Limits
 
 Row = tuple[int, ...]
 _CHUNK = 1 << 20
@@ -26,7 +24,7 @@ def derive(
     program: Sequence[str],
     outputs: Mapping[str, int],
     counted: frozenset[str],
-    limits: GroundLimits,
+    limits: Limits,
     *,
     small: bool,
 ) -> dict[str, list[Row]]:
@@ -34,7 +32,7 @@ def derive(
 
     Facts of ``counted`` predicates are bounded by ``limits.actions``, all together by
     ``limits.facts``. ``small`` says that the program cannot derive many facts. Raises
-    :class:`LimitReached` (codes BBT0401, BBT0402).
+    :class:`bbtc.diagnostics.LimitReached`.
     """
     if small:
         return _in_process(program, outputs)
@@ -71,9 +69,9 @@ clingo_main(Application(), ["--mode=gringo", "--text", "--warn=none", sys.argv[2
 
 
 def _in_child(
-    program: Sequence[str], outputs: Mapping[str, int], counted: frozenset[str], limits: GroundLimits
+    program: Sequence[str], outputs: Mapping[str, int], counted: frozenset[str], limits: Limits
 ) -> dict[str, list[Row]]:
-    deadline = None if limits.seconds is None else time.monotonic() + limits.seconds
+    seconds = limits.remaining
     with tempfile.TemporaryDirectory(prefix="bbtc-") as folder:
         path = Path(folder, "program.lp")
         path.write_text("\n".join(program), encoding="ascii")
@@ -82,7 +80,7 @@ def _in_child(
         process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
-        timer = None if limits.seconds is None else threading.Timer(limits.seconds, process.kill)
+        timer = None if seconds is None else threading.Timer(seconds, process.kill)
         try:
             if timer is not None:
                 timer.start()
@@ -94,9 +92,8 @@ def _in_child(
             process.kill()
             process.communicate()
     if process.returncode not in (0, 10, 20, 30):
-        if deadline is not None and time.monotonic() >= deadline:
-            raise _limit("BBT0402", f"grounding took longer than {limits.seconds:g} s")
-        raise _limit("BBT0402", "grounding ran out of memory")
+        limits.check_time("grounding")
+        raise limits.reached("the memory limit ended grounding", "--max-memory")
     return rows
 
 
@@ -104,7 +101,7 @@ def _collect(
     process: subprocess.Popen[bytes],
     outputs: Mapping[str, int],
     counted: frozenset[str],
-    limits: GroundLimits,
+    limits: Limits,
 ) -> dict[str, list[Row]]:
     assert process.stdout is not None
     rows: dict[bytes, list[Row]] = {name.encode(): [] for name in outputs}
@@ -118,10 +115,8 @@ def _collect(
             found = rows.get(name.rstrip(b"."))
             if found is not None:
                 found.append(tuple(map(int, args[:-2].split(b","))) if args else ())
-        if facts > limits.facts:
-            raise _limit("BBT0401", f"grounding derives more than {limits.facts} facts")
-        if sum(len(rows[name]) for name in bounded) > limits.actions:
-            raise _limit("BBT0401", f"the task has more than {limits.actions} ground actions")
+        limits.check_facts(facts)
+        limits.check_actions(sum(len(rows[name]) for name in bounded))
     return {name.decode(): found for name, found in rows.items()}
 
 
@@ -134,11 +129,3 @@ def _blocks(descriptor: int) -> Iterator[list[bytes]]:
         yield lines
     if rest:
         yield [rest]
-
-
-def _limit(code: str, message: str) -> LimitReached:
-    limit = LimitReached.single(
-        code, message, hint="raise the limit, or give parameters more precise types and preconditions"
-    )
-    assert isinstance(limit, LimitReached)
-    return limit

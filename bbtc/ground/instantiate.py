@@ -12,18 +12,18 @@ from bbtc.ground.atoms import Atoms, Binding
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
 from bbtc.ground.datalog import Row
 from bbtc.ground.effects import EffectGrounder
-from bbtc.ground.limits import DEFAULT_LIMITS, GroundLimits
 from bbtc.ground.normal import normalise
 from bbtc.ground.prune import prune
 from bbtc.ground.reach import reach
 from bbtc.ground.start import Beginning, beginning
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 
 
-def ground(model: md.Model, report: Report, limits: GroundLimits = DEFAULT_LIMITS) -> gt.Task:
+def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """The ground task of a model: reachable and relevant, static facts folded away.
 
     Raises :class:`bbtc.diagnostics.BbtcError` with everything in ``report`` where the model cannot
@@ -33,7 +33,7 @@ def ground(model: md.Model, report: Report, limits: GroundLimits = DEFAULT_LIMIT
     return prune(instantiate(model, report, limits))
 
 
-def instantiate(model: md.Model, report: Report, limits: GroundLimits = DEFAULT_LIMITS) -> gt.Task:
+def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """:func:`ground` without leaving out what cannot matter to the goal."""
     _refuse(model, report)
     begin = beginning(model, report, limits)

@@ -131,9 +131,7 @@ class Builder:
         """Indices of the objects of one of the types, in order of declaration."""
         hierarchy = self.model.types
         return [
-            index
-            for index, each in enumerate(self.model.objects.values())
-            if any(hierarchy.is_subtype(name, types) for name in each.types)
+            index for index, each in enumerate(self.model.objects.values()) if hierarchy.contains(types, each)
         ]
 
     # --- the program -----------------------------------------------------------------------

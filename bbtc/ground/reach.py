@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bbtc.ground.datalog import Row, derive
-from bbtc.ground.limits import GroundLimits
 from bbtc.ground.program import Builder, Start
 from bbtc.ground.start import Beginning
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.model import domain as md
 
 _SMALL = 20_000
@@ -37,7 +37,7 @@ class Reach:
         return row in self.values[value].get(predicate, ())
 
 
-def reach(model: md.Model, begin: Beginning, limits: GroundLimits) -> Reach:
+def reach(model: md.Model, begin: Beginning, limits: Limits) -> Reach:
     """The least fixpoint. Raises :class:`bbtc.diagnostics.LimitReached`."""
     start = _start(model, begin)
     builder = Builder(model, start)

@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
-from bbtc.ground.limits import GroundLimits
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model.formula import is_parameter
@@ -26,7 +26,7 @@ class Beginning:
     states: tuple[tuple[Fraction, World], ...]
 
 
-def beginning(model: md.Model, report: Report, limits: GroundLimits) -> Beginning:
+def beginning(model: md.Model, report: Report, limits: Limits) -> Beginning:
     """The initial states of a model. Constructs that need hidden facts are refused with their own
     codes: BBT0404 (``oneof``), BBT0405 (``or`` and other clauses), BBT0403 (too many states)."""
     facts = {(fact.predicate, fact.args): fact.value for fact in model.init.facts}
@@ -109,7 +109,7 @@ def _draw(
                     {**each, parameter.name: name}
                     for each in bindings
                     for name, thing in model.objects.items()
-                    if any(model.types.is_subtype(type_, parameter.types) for type_ in thing.types)
+                    if model.types.contains(parameter.types, thing)
                 ]
             return _product([_draw(model, inner, each, limit) for each in bindings], limit)
         case _:

@@ -11,6 +11,7 @@ from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
 from bbtc.model.formula import Formula, Term
+from bbtc.model.formula import substitute as substitute_formula
 from bbtc.model.types import Parameter
 from bbtc.source import Span
 
@@ -147,3 +148,35 @@ def conditions(effect: Effect) -> Iterator[Formula]:
                 yield from conditions(branch.effect)
         case _:
             assert_never(effect)
+
+
+def substitute(effect: Effect, binding: dict[str, Term]) -> Effect:
+    """The effect with free parameters replaced (see :func:`bbtc.model.formula.substitute`)."""
+    match effect:
+        case Set(predicate, args, value, span):
+            return Set(predicate, tuple(binding.get(a, a) for a in args), value, span)
+        case Add(to, amount, sign, span):
+            return Add(to, _substitute_amount(amount, binding), sign, span)
+        case Together(parts, span):
+            return Together(tuple(substitute(part, binding) for part in parts), span)
+        case When(condition, inner, span):
+            return When(substitute_formula(condition, binding), substitute(inner, binding), span)
+        case ForEach(parameters, inner, span):
+            return ForEach(parameters, substitute(inner, binding), span)
+        case Choice(branches, oneof, span):
+            drawn = tuple(Branch(b.probability, substitute(b.effect, binding), b.span) for b in branches)
+            return Choice(drawn, oneof, span)
+        case _:
+            assert_never(effect)
+
+
+def _substitute_amount(amount: Amount, binding: dict[str, Term]) -> Amount:
+    match amount:
+        case Constant():
+            return amount
+        case FunctionValue(function, args, span):
+            return FunctionValue(function, tuple(binding.get(a, a) for a in args), span)
+        case Arithmetic(operator, operands, span):
+            return Arithmetic(operator, tuple(_substitute_amount(o, binding) for o in operands), span)
+        case _:
+            assert_never(amount)

@@ -34,7 +34,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class Object:
-    """A constant of the domain or an object of the problem, and its types."""
+    """A constant of the domain or an object of the problem; it is of each of its types."""
 
     name: str
     types: tuple[str, ...] = (OBJECT,)
@@ -70,10 +70,15 @@ class TypeHierarchy:
         """Whether every object of the type is of one of the other types."""
         return not self.ancestors[name].isdisjoint(of)
 
-    def fits(self, given: Iterable[str], wanted: Iterable[str]) -> bool:
-        """Whether every object of ``given`` (one of its types each) is of one of ``wanted``."""
+    def fits(self, parameter: Iterable[str], wanted: Iterable[str]) -> bool:
+        """Whether everything a parameter of the given types takes is of one of ``wanted``."""
         wanted = tuple(wanted)
-        return all(self.is_subtype(name, wanted) for name in given)
+        return all(self.is_subtype(name, wanted) for name in parameter)
+
+    def contains(self, wanted: Iterable[str], thing: Object) -> bool:
+        """Whether the object is of one of the types."""
+        wanted = tuple(wanted)
+        return any(self.is_subtype(name, wanted) for name in thing.types)
 
     def overlaps(self, given: Iterable[str], wanted: Iterable[str]) -> bool:
         """Whether some object could be of both, as far as the declarations tell: one type is

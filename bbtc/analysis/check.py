@@ -1,0 +1,292 @@
+"""Checks of a model: each a pure function with a code of its own, all of them warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from typing_extensions import assert_never
+
+from bbtc.analysis import facts
+from bbtc.analysis.bodies import calls
+from bbtc.diagnostics import Diagnostic, Related, Severity
+from bbtc.kleene import Truth
+from bbtc.model import domain as md
+from bbtc.model import effect as me
+from bbtc.model import formula as mf
+from bbtc.model.types import Parameter
+from bbtc.source import Span
+
+_SHORTFALL = Fraction(1, 100)
+"""A no-change remainder of this probability or less is likely a slip of the pen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A check and the code of its findings. ``needs_problem``: it says nothing of a domain alone."""
+
+    code: str
+    find: Callable[[md.Model], Iterator[Diagnostic]]
+    needs_problem: bool = False
+
+
+def check(model: md.Model) -> Iterator[Diagnostic]:
+    """The findings of every check that applies."""
+    for each in CHECKS:
+        if model.problem is not None or not each.needs_problem:
+            yield from each.find(model)
+
+
+def _warning(
+    code: str, message: str, span: Span | None, hint: str | None = None, related: tuple[Related, ...] = ()
+) -> Diagnostic:
+    return Diagnostic(code, message, span, hint, Severity.WARNING, related)
+
+
+# --- predicates and conditions ---------------------------------------------------------------
+
+
+def _unused_predicates(model: md.Model) -> Iterator[Diagnostic]:
+    read = {atom.predicate for formula in facts.all_conditions(model) for atom in mf.atoms(formula)}
+    for schema in model.schemas.values():
+        read |= facts.observed(schema)
+    written = {leaf.predicate for schema in model.schemas.values() for leaf in facts.settings(schema.effect)}
+    written |= {rule.predicate for rule in model.rules}
+    for name, predicate in model.predicates.items():
+        if name in read:
+            continue
+        if name not in written:
+            yield _warning("BBT0301", f"predicate `{name}` is never used", predicate.span)
+        elif model.problem is not None:
+            yield _warning(
+                "BBT0301",
+                f"nothing reads predicate `{name}`",
+                predicate.span,
+                "no precondition, `when`, template or goal depends on it",
+            )
+
+
+def _hopeless_conditions(model: md.Model) -> Iterator[Diagnostic]:
+    reached = facts.reached(model)
+    known = {
+        leaf.predicate
+        for schema in model.schemas.values()
+        for leaf in facts.settings(schema.effect)
+        if leaf.value is not Truth.UNKNOWN
+    }
+    for schema in model.schemas.values():
+        known |= facts.observed(schema)
+    known |= {atom.predicate for sensor in model.sensors for atom in mf.atoms(sensor.sensed)}
+    told: set[tuple[str, Truth | None]] = set()
+    for formula in facts.all_conditions(model):
+        for reading in facts.readings(formula):
+            name = reading.atom.predicate
+            predicate = model.predicates[name]
+            related = (Related(f"`{name}` is declared here", predicate.span),)
+            if (name, Truth.UNKNOWN) in reached.values and name not in known and not predicate.derived:
+                if reading.value is not Truth.UNKNOWN and (name, None) not in told:
+                    told.add((name, None))
+                    message = f"no action makes `{name}` known"
+                    yield _warning("BBT0304", message, reading.span, None, related)
+            elif (
+                reading.value is not None
+                and (name, reading.value) not in reached.values
+                and (name, reading.value) not in told
+            ):
+                told.add((name, reading.value))
+                message = f"nothing makes `{name}` {reading.value.word}"
+                hint = "neither `:init` nor the effect of an action that can apply"
+                yield _warning("BBT0304", message, reading.span, hint, related)
+
+
+# --- actions ---------------------------------------------------------------------------------
+
+
+def _unreachable_actions(model: md.Model) -> Iterator[Diagnostic]:
+    reached = facts.reached(model)
+    for name, schema in model.schemas.items():
+        if name not in reached.actions:
+            first = _impossible(schema.precondition, reached)
+            related = () if first is None else (Related("this is never true", first.span),)
+            yield _warning("BBT0302", f"action `{name}` can never apply", schema.span, None, related)
+
+
+def _impossible(formula: mf.Formula, reached: facts.Reached) -> mf.Formula | None:
+    """The innermost part that makes a condition impossible."""
+    if isinstance(formula, mf.And):
+        for part in formula.parts:
+            if not reached.possible(part):
+                return _impossible(part, reached)
+    return formula
+
+
+def _contradictions(model: md.Model) -> Iterator[Diagnostic]:
+    for schema in model.schemas.values():
+        yield from _contradictions_in(schema.effect, {})
+
+
+def _contradictions_in(
+    effect: me.Effect, above: dict[tuple[str, tuple[str, ...]], me.Set]
+) -> Iterator[Diagnostic]:
+    """Settings that happen together with others of the same atom. ``above`` holds those that always
+    happen beside the effect; settings under a ``when`` or a quantifier have their own company."""
+    match effect:
+        case me.Set(predicate, args, value, span):
+            before = above.setdefault((predicate, args), effect)
+            if before.value is not value:
+                yield _warning(
+                    "BBT0303",
+                    f"one outcome makes `{predicate}` both {before.value.word} and {value.word}",
+                    span,
+                    f"{max(before.value, value).word} wins",
+                    (Related("the other one", before.span),),
+                )
+        case me.Together(parts):
+            certain = sorted(parts, key=lambda part: not isinstance(part, me.Set))
+            for part in certain:
+                yield from _contradictions_in(part, above)
+        case me.When(_, inner) | me.ForEach(_, inner):
+            yield from _contradictions_in(inner, {})
+        case me.Choice(branches):
+            for branch in branches:
+                yield from _contradictions_in(branch.effect, dict(above))
+        case me.Add():
+            return
+        case _:
+            assert_never(effect)
+
+
+def _duplicates(model: md.Model) -> Iterator[Diagnostic]:
+    seen: dict[tuple[object, ...], md.Schema] = {}
+    for schema in model.schemas.values():
+        renamed = {parameter.name: f"?{number}" for number, parameter in enumerate(schema.parameters)}
+        observe = schema.observe
+        if isinstance(observe, me.Choice):
+            observed: object = me.substitute(observe, dict(renamed))
+        else:
+            observed = None if observe is None else mf.substitute(observe, dict(renamed))
+        key = (
+            tuple(parameter.types for parameter in schema.parameters),
+            mf.substitute(schema.precondition, dict(renamed)),
+            me.substitute(schema.effect, dict(renamed)),
+            observed,
+        )
+        before = seen.setdefault(key, schema)
+        if before is not schema:
+            yield _warning(
+                "BBT0305",
+                f"action `{schema.name}` does the same as `{before.name}`",
+                schema.span,
+                None,
+                (Related(f"`{before.name}`", before.span),),
+            )
+
+
+def _without_effect(model: md.Model) -> Iterator[Diagnostic]:
+    for name, schema in model.schemas.items():
+        if schema.observe is None and next(facts.settings(schema.effect), None) is None:
+            yield _warning("BBT0306", f"action `{name}` changes nothing", schema.span)
+
+
+def _irrelevant_actions(model: md.Model) -> Iterator[Diagnostic]:
+    if model.goal is None:
+        return
+    _, actions = facts.relevant(model)
+    for name, schema in model.schemas.items():
+        if name not in actions and next(facts.settings(schema.effect), None) is not None:
+            yield _warning(
+                "BBT0307",
+                f"action `{name}` cannot matter to the goal",
+                schema.span,
+                "no condition on the way to the goal reads what it changes",
+            )
+
+
+# --- probabilities, parameters, templates ----------------------------------------------------
+
+
+def _probabilities(model: md.Model) -> Iterator[Diagnostic]:
+    for schema in model.schemas.values():
+        yield from _probabilities_in(schema.effect)
+
+
+def _probabilities_in(effect: me.Effect) -> Iterator[Diagnostic]:
+    match effect:
+        case me.Together(parts):
+            for part in parts:
+                yield from _probabilities_in(part)
+        case me.When(_, inner) | me.ForEach(_, inner):
+            yield from _probabilities_in(inner)
+        case me.Choice(branches, _, span):
+            for branch in branches:
+                rest = branch.span == span and branch.effect == me.NOTHING
+                if branch.probability == 0:
+                    yield _warning("BBT0308", "this outcome has probability 0", branch.span)
+                elif rest and branch.probability <= _SHORTFALL:
+                    total = float(1 - branch.probability)
+                    yield _warning(
+                        "BBT0308",
+                        f"the probabilities sum to {total:.9g}, just short of 1",
+                        span,
+                        "what is missing to 1 means no change",
+                    )
+                yield from _probabilities_in(branch.effect)
+        case me.Set() | me.Add():
+            return
+        case _:
+            assert_never(effect)
+
+
+def _unused_parameters(model: md.Model) -> Iterator[Diagnostic]:
+    for schema in model.schemas.values():
+        marked = [(p, replace(p, name=f"{p.name} ")) for p in schema.parameters]
+        for parameter, other in marked:
+            if not _occurs(schema, parameter, other):
+                yield _warning(
+                    "BBT0309",
+                    f"action `{schema.name}` never uses its parameter `{parameter.name}`",
+                    parameter.span,
+                    "every object it may take makes another ground action",
+                )
+
+
+def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
+    """Whether renaming the parameter changes the action."""
+    binding: dict[str, str] = {parameter.name: other.name}
+    observe = schema.observe
+    if isinstance(observe, me.Choice):
+        changed: object = me.substitute(observe, binding)
+    else:
+        changed = None if observe is None else mf.substitute(observe, binding)
+    return (
+        mf.substitute(schema.precondition, binding) != schema.precondition
+        or me.substitute(schema.effect, binding) != schema.effect
+        or changed != observe
+    )
+
+
+def _unused_templates(model: md.Model) -> Iterator[Diagnostic]:
+    called = {call.name for template in model.templates.values() for call in calls(template.body)}
+    for name, template in model.templates.items():
+        if template.effect is None and name not in called:
+            yield _warning(
+                "BBT0310",
+                f"template `{name}` is never used",
+                template.span,
+                "give it an `:effect` that tells the planner what it is for, or call it from another",
+            )
+
+
+CHECKS = (
+    Check("BBT0301", _unused_predicates),
+    Check("BBT0302", _unreachable_actions, needs_problem=True),
+    Check("BBT0303", _contradictions),
+    Check("BBT0304", _hopeless_conditions, needs_problem=True),
+    Check("BBT0305", _duplicates),
+    Check("BBT0306", _without_effect),
+    Check("BBT0307", _irrelevant_actions, needs_problem=True),
+    Check("BBT0308", _probabilities),
+    Check("BBT0309", _unused_parameters),
+    Check("BBT0310", _unused_templates),
+)

@@ -1,0 +1,237 @@
+"""What the checks ask of a model: which predicates are read, set and reachable, by value."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from typing_extensions import assert_never
+
+from bbtc.analysis.bodies import calls
+from bbtc.kleene import Truth
+from bbtc.model import domain as md
+from bbtc.model import effect as me
+from bbtc.model import formula as mf
+from bbtc.source import Span
+
+Value = tuple[str, Truth]
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """An atom in a condition. ``value`` is what makes the condition true; None for ``known``."""
+
+    atom: mf.Atom
+    value: Truth | None
+    span: Span | None
+
+
+def readings(formula: mf.Formula, negative: bool = False) -> Iterator[Reading]:
+    """Every atom of a condition, with the value that helps to make it true."""
+    match formula:
+        case mf.Atom(_, _, span):
+            yield Reading(formula, Truth.FALSE if negative else Truth.TRUE, span)
+        case mf.Test(kind, atom, span):
+            unknown = (kind == "unknown") is not negative
+            yield Reading(atom, Truth.UNKNOWN if unknown else None, span)
+        case mf.Equal():
+            return
+        case mf.Not(part):
+            yield from readings(part, not negative)
+        case mf.And(parts) | mf.Or(parts):
+            for part in parts:
+                yield from readings(part, negative)
+        case mf.Quantified(_, _, part):
+            yield from readings(part, negative)
+        case _:
+            assert_never(formula)
+
+
+def body_conditions(body: md.Body) -> Iterator[mf.Formula]:
+    """The conditions in a template body."""
+    match body:
+        case md.BodyCondition(condition):
+            yield condition
+        case md.BodyControl(_, children):
+            for child in children:
+                yield from body_conditions(child)
+        case md.BodyForeach(_, child):
+            yield from body_conditions(child)
+        case md.BodyCall():
+            return
+        case _:
+            assert_never(body)
+
+
+def schema_conditions(schema: md.Schema) -> Iterator[mf.Formula]:
+    """The precondition, guards and observed condition of an action."""
+    yield schema.precondition
+    yield from me.conditions(schema.effect)
+    if isinstance(schema.observe, me.Choice):
+        yield from me.conditions(schema.observe)
+    elif schema.observe is not None:
+        yield schema.observe
+
+
+def template_conditions(template: md.Template) -> Iterator[mf.Formula]:
+    """The guide's precondition and guards, and the conditions of the body."""
+    yield template.precondition
+    if template.effect is not None:
+        yield from me.conditions(template.effect)
+    yield from body_conditions(template.body)
+
+
+def all_conditions(model: md.Model) -> Iterator[mf.Formula]:
+    """Every condition of a model."""
+    for schema in model.schemas.values():
+        yield from schema_conditions(schema)
+    for rule in model.rules:
+        yield rule.condition
+    for sensor in model.sensors:
+        yield sensor.condition
+        yield sensor.sensed
+    for template in model.templates.values():
+        yield from template_conditions(template)
+    yield from (clause.condition for clause in model.init.clauses)
+    if model.goal is not None:
+        yield model.goal
+
+
+def settings(effect: me.Effect) -> Iterator[me.Set]:
+    """Every setting an effect may make."""
+    return (leaf for leaf in me.leaves(effect) if isinstance(leaf, me.Set))
+
+
+def observed(schema: md.Schema) -> set[str]:
+    """Predicates that ``:observe`` makes known."""
+    if schema.observe is None:
+        return set()
+    if isinstance(schema.observe, me.Choice):
+        return {leaf.predicate for leaf in settings(schema.observe)}
+    return {atom.predicate for atom in mf.atoms(schema.observe)}
+
+
+@dataclass(slots=True)
+class Reached:
+    """The values that some atom of each predicate can have, and the actions that can apply, if
+    arguments are ignored and nothing is ever undone: whatever is not here never happens."""
+
+    values: dict[Value, None] = field(default_factory=dict)
+    actions: dict[str, None] = field(default_factory=dict)
+
+    def possible(self, formula: mf.Formula, negative: bool = False) -> bool:
+        """Whether the condition may be true at some time."""
+        match formula:
+            case mf.Atom(predicate):
+                return (predicate, Truth.FALSE if negative else Truth.TRUE) in self.values
+            case mf.Test(kind, atom):
+                unknown = (kind == "unknown") is not negative
+                return not unknown or (atom.predicate, Truth.UNKNOWN) in self.values
+            case mf.Equal():
+                return True
+            case mf.Not(part):
+                return self.possible(part, not negative)
+            case mf.And(parts) | mf.Or(parts):
+                every = isinstance(formula, mf.And) is not negative
+                return (all if every else any)(self.possible(part, negative) for part in parts)
+            case mf.Quantified(_, _, part):
+                return self.possible(part, negative)
+            case _:
+                assert_never(formula)
+
+
+def reached(model: md.Model) -> Reached:
+    """Predicate-level reachability from the initial state of a model with a problem."""
+    result = Reached()
+    given: dict[str, set[Truth]] = {}
+    for fact in model.init.facts:
+        given.setdefault(fact.predicate, set()).add(fact.value)
+        result.values[fact.predicate, fact.value] = None
+    for choice in model.init.choices:
+        for leaf in settings(choice):
+            result.values[leaf.predicate, leaf.value] = None
+    for clause in model.init.clauses:
+        # Uncertain: any of the atoms may have any value.
+        for atom in mf.atoms(clause.condition):
+            result.values.update({(atom.predicate, value): None for value in Truth})
+    for name, predicate in model.predicates.items():
+        # Of a predicate with arguments some atom is false, or so it is taken.
+        if predicate.parameters or Truth.FALSE in given.get(name, {Truth.FALSE}):
+            result.values[name, Truth.FALSE] = None
+        if predicate.derived:
+            result.values[name, Truth.FALSE] = None
+            if predicate.three_valued:
+                result.values[name, Truth.UNKNOWN] = None
+    _close(model, result)
+    return result
+
+
+def _close(model: md.Model, result: Reached) -> None:
+    grown = True
+    while grown:
+        before = len(result.values) + len(result.actions)
+        for rule in model.rules:
+            if result.possible(rule.condition):
+                result.values[rule.predicate, Truth.TRUE] = None
+        for schema in model.schemas.values():
+            if schema.name in result.actions or result.possible(schema.precondition):
+                result.actions[schema.name] = None
+                _apply(schema.effect, result)
+        grown = len(result.values) + len(result.actions) > before
+
+
+def _apply(effect: me.Effect, result: Reached) -> None:
+    match effect:
+        case me.Set(predicate, _, value):
+            result.values[predicate, value] = None
+        case me.Add():
+            return
+        case me.Together(parts):
+            for part in parts:
+                _apply(part, result)
+        case me.When(condition, inner):
+            if result.possible(condition):
+                _apply(inner, result)
+        case me.ForEach(_, inner):
+            _apply(inner, result)
+        case me.Choice(branches):
+            for branch in branches:
+                _apply(branch.effect, result)
+        case _:
+            assert_never(effect)
+
+
+def relevant(model: md.Model) -> tuple[set[str], set[str]]:
+    """Predicates and actions that can matter to the goal, to a reward metric or to a template."""
+    predicates: set[str] = set()
+    actions: set[str] = set()
+
+    def read(formulas: Iterable[mf.Formula]) -> None:
+        predicates.update(atom.predicate for formula in formulas for atom in mf.atoms(formula))
+
+    if model.goal is not None:
+        read([model.goal])
+    for template in model.templates.values():
+        read(template_conditions(template))
+        actions.update(call.name for call in calls(template.body) if call.kind == "action")
+    size = -1
+    while size != len(predicates) + len(actions):
+        size = len(predicates) + len(actions)
+        for rule in model.rules:
+            if rule.predicate in predicates:
+                read([rule.condition])
+        for sensor in model.sensors:
+            read([sensor.condition, sensor.sensed])
+        for name, schema in model.schemas.items():
+            rewarding = model.metric == "reward" and any(
+                isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect)
+            )
+            if (
+                name in actions
+                or rewarding
+                or schema.observe is not None
+                or any(leaf.predicate in predicates for leaf in settings(schema.effect))
+            ):
+                actions.add(name)
+                read(schema_conditions(schema))
+    return predicates, actions
