@@ -60,7 +60,7 @@ def select(documents: Sequence[Document], report: Report) -> Inputs | None:
     return Inputs(found["domain"][0], found["problem"][0] if found["problem"] else None)
 
 
-def resolve_model(inputs: Inputs, report: Report, *, checks: bool = True) -> Model:
+def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
     """Names resolved and, with ``checks``, the doubtful reported. Raises :class:`BbtcError`."""
     from bbtc.analysis.check import check
     from bbtc.analysis.resolve import resolve
@@ -75,9 +75,13 @@ def resolve_model(inputs: Inputs, report: Report, *, checks: bool = True) -> Mod
     return model
 
 
-def compile_sources(sources: Sequence[SourceFile], report: Report, limits: Limits) -> Task:
-    """From text to ground task. Raises :class:`BbtcError` with every error found, or
-    :class:`bbtc.diagnostics.LimitReached`."""
+def compile_sources(
+    sources: Sequence[SourceFile], report: Report, limits: Limits, *, checks: bool = False
+) -> Task:
+    """From text to ground task; with ``checks``, what is doubtful is reported on the way.
+
+    Raises :class:`BbtcError` with every error found, or :class:`bbtc.diagnostics.LimitReached`.
+    """
     documents = parse_all(sources, report)
     report.raise_errors()
     inputs = select(documents, report)
@@ -86,7 +90,7 @@ def compile_sources(sources: Sequence[SourceFile], report: Report, limits: Limit
     if inputs.problem is None:
         names = ", ".join(source.name for source in sources)
         raise BbtcError.single("BBT0006", f"no problem in {names}", hint="give the problem's file, too")
-    return ground_model(resolve_model(inputs, report), report, limits)
+    return ground_model(resolve_model(inputs, report, checks=checks), report, limits)
 
 
 def ground_model(model: Model, report: Report, limits: Limits) -> Task:

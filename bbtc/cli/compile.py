@@ -36,7 +36,8 @@ def command(
 
     sources = [session.read(file) for file in files]
     if emit == "ground":
-        task = pipeline.compile_sources(sources, session.report, Limits(seconds=time_limit))
+        limits = Limits(seconds=time_limit)
+        task = pipeline.compile_sources(sources, session.report, limits, checks=True)
         text = artefacts.dumps(artefacts.task_to_json(task))
         session.say(
             f"{task.domain}/{task.problem}: {len(task.variables)} variables, {len(task.actions)} actions, "
@@ -51,7 +52,8 @@ def command(
             inputs = pipeline.select(documents, session.report)
             session.report.raise_errors()
             assert inputs is not None
-            text = artefacts.dumps(artefacts.model_to_json(pipeline.resolve_model(inputs, session.report)))
+            model = pipeline.resolve_model(inputs, session.report, checks=True)
+            text = artefacts.dumps(artefacts.model_to_json(model))
     write(output, text, check=check)
     if depfile is not None:
         write_depfile(depfile, output, session.inputs)

@@ -1,0 +1,272 @@
+"""Bad input: a clear message with place and code, the documented exit status, nothing written."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+HOUSEHOLD = REPOSITORY / "domains" / "household"
+DOMAIN = (HOUSEHOLD / "domain.pddl").read_text()
+PROBLEM = (HOUSEHOLD / "look-for-soda.pddl").read_text()
+
+HOSTILE = 'a"); import os #'
+
+
+def bbtc(*arguments: str, folder: Path, stdin: str | bytes | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the command in a folder of its own."""
+    data = stdin.encode() if isinstance(stdin, str) else stdin
+    done = subprocess.run(
+        [sys.executable, "-m", "bbtc.cli.main", *arguments],
+        cwd=folder,
+        input=data,
+        capture_output=True,
+        check=False,
+        timeout=60,
+    )
+    return subprocess.CompletedProcess(
+        done.args, done.returncode, done.stdout.decode(), done.stderr.decode(errors="replace")
+    )
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], folder: Path, *words: str, place: str = "") -> str:
+    """Exit status 1, a message with a code (at the place), no traceback, no output file; its text."""
+    assert done.returncode == 1, done.stderr
+    assert re.search(r"error\[BBT\d{4}\]: ", done.stderr)
+    assert "Traceback" not in done.stderr
+    assert place in done.stderr
+    for word in words:
+        assert word in done.stderr
+    assert done.stdout == ""
+    assert (folder / "out.json").read_text() == "as it was"
+    assert sorted(path.name for path in folder.iterdir() if path.name.startswith(".")) == []
+    return done.stderr
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the household, and an output file that must survive."""
+    (tmp_path / "domain.pddl").write_text(DOMAIN)
+    (tmp_path / "problem.pddl").write_text(PROBLEM)
+    (tmp_path / "out.json").write_text("as it was")
+    return tmp_path
+
+
+def line_of(text: str, part: str) -> int:
+    """1-based line of the first occurrence of a text."""
+    return text[: text.index(part)].count("\n") + 1
+
+
+# What is replaced in the domain (or, where it is not there, in the problem) by what, the text
+# that the place must point at, and words of the message.
+EDITS = {
+    "unknown predicate": ("(seen soda))\n  (:goal-p", "(sen soda))\n  (:goal-p", "sen soda", ["sen", "seen"]),
+    "wrong arity": ("(:goal (seen soda))", "(:goal (seen soda sprayer))", "seen soda sprayer", ["1", "2"]),
+    "wrong type": ("(:goal (seen soda))", "(:goal (seen table1))", "table1", ["place", "item"]),
+    "unknown object": ("(:goal (seen soda))", "(:goal (seen sodda))", "sodda", ["sodda", "soda"]),
+    "unknown parameter": ("(known (seen ?item))", "(known (seen ?itm))", "?itm", ["?itm", "?item"]),
+    "unknown type": ("(:types place item)", "(:types palce item)", "place", ["place", "palce"]),
+    "unknown keyword": (
+        ":precondition (and (luminousity",
+        ":precondtion (and (luminousity",
+        ":precondtion",
+        [],
+    ),
+    "probability above 1": ("0.95 (at", "1.2 (at", "1.2", ["1.2"]),
+    "negative probability": ("0.95 (at", "-0.2 (at", "-0.2", ["-0.2"]),
+    "sum above 1": ("0.5 (not (seen", "0.6 (not (seen", "", ["1.1"]),
+    "goal probability": ("(:goal-probability 0.9)", "(:goal-probability 1.5)", "1.5", ["1.5"]),
+    "unknown call": ("(goto ?place)\n", "(gotto ?place)\n", "gotto", ["gotto", "goto"]),
+    "duplicate action": (
+        "(:action light_on",
+        "(:action detect\n    :effect (luminousity_ok))\n  (:action light_on",
+        "",
+        [],
+    ),
+    "unsupported": (
+        "(:action light_on",
+        "(:durative-action boil)\n  (:action light_on",
+        ":durative-action",
+        [],
+    ),
+    "two domains": ("(define (domain", "(define (domain first))\n(define (domain", "household", ["domain"]),
+}
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_error_in_the_text_points_at_its_place(folder: Path, name: str) -> None:
+    before, after, at, words = EDITS[name]
+    file = "domain.pddl" if before in DOMAIN else "problem.pddl"
+    text = (folder / file).read_text()
+    assert text.count(before) == 1
+    edited = text.replace(before, after)
+    (folder / file).write_text(edited)
+    done = bbtc("plan", "domain.pddl", "problem.pddl", "-o", "out.json", folder=folder)
+    place = ""
+    if at:
+        # The line: of the edit itself, wherever else the words may stand.
+        start = edited.index(after) + (after.index(at) if at in after else 0)
+        if at in after:
+            place = f"{file}:{edited[:start].count(chr(10)) + 1}:"
+    assert_refused(done, folder, *words, place=place)
+
+
+@pytest.mark.parametrize("command", ["check", "compile", "plan", "simulate", "export"])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "empty"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR\x00\xff\xfe", ""),
+        (b"{", ""),
+        (b'{"format": "bbtc-tree", "version": 1}', ""),
+        (None, "no such file"),
+    ],
+)
+def test_no_usable_file(folder: Path, command: str, content: bytes | None, words: str) -> None:
+    if content is not None:
+        (folder / "odd").write_bytes(content)
+    options = {"export": ["--to", "dot", "-o", "out.json"], "check": []}.get(command, ["-o", "out.json"])
+    done = bbtc(command, "odd", *options, folder=folder)
+    assert words in assert_refused(done, folder, "odd").lower()
+
+
+def test_a_folder_is_not_a_file(folder: Path) -> None:
+    (folder / "sub").mkdir()
+    assert_refused(bbtc("compile", "sub", "-o", "out.json", folder=folder), folder, "sub")
+
+
+def test_an_unclosed_parenthesis_is_found_where_it_opens(folder: Path) -> None:
+    broken = DOMAIN.replace("    :effect (luminousity_ok))", "    :effect (luminousity_ok)")
+    assert broken != DOMAIN
+    (folder / "domain.pddl").write_text(broken)
+    done = bbtc("check", "domain.pddl", folder=folder)
+    assert_refused(done, folder, place=f"domain.pddl:{line_of(broken, '(:action light_on')}:")
+
+
+def test_an_unreachable_goal(folder: Path) -> None:
+    (folder / "problem.pddl").write_text(
+        PROBLEM.replace("(seen soda))\n  (:goal-p", "(grasped soda))\n  (:goal-p")
+    )
+    (folder / "domain.pddl").write_text(
+        re.sub(r"0\.2 \(grasped \?item\)", "0.2 (not (grasped ?item))", DOMAIN)
+    )
+    done = bbtc("plan", "domain.pddl", "problem.pddl", "-o", "out.json", folder=folder)
+    assert_refused(done, folder, "grasped", place="problem.pddl:8:")
+
+
+def test_an_action_in_a_child_of_a_skipper_that_is_not_the_last(folder: Path) -> None:
+    broken = DOMAIN.replace(":body (sequence\n      (goto", ":body (skipper\n      (goto")
+    assert broken != DOMAIN
+    (folder / "domain.pddl").write_text(broken)
+    done = bbtc("plan", "domain.pddl", "problem.pddl", "-o", "out.json", folder=folder)
+    assert_refused(done, folder, "skipper", place=f"domain.pddl:{line_of(broken, '(goto ?place)')}:")
+
+
+def test_the_skipper_rule_holds_for_trees_made_elsewhere(folder: Path) -> None:
+    assert bbtc("plan", "domain.pddl", "problem.pddl", "-o", "tree.json", folder=folder).returncode == 0
+    tree = json.loads((folder / "tree.json").read_text())
+    skipper = tree["root"]["children"][0]
+    assert skipper["type"] == "skipper"
+    skipper["children"].reverse()
+    (folder / "tree.json").write_text(json.dumps(tree))
+    for command in (["simulate"], ["export", "--to", "btcpp"]):
+        done = bbtc(command[0], "tree.json", *command[1:], "-o", "out.json", folder=folder)
+        assert_refused(done, folder, "kipper")
+
+
+@pytest.mark.parametrize("name", [HOSTILE, "x'''", "a\\", "]]><b>", "a\nb", "\x1b[31mred"])
+def test_a_name_meant_to_break_out_of_generated_code_is_refused(folder: Path, name: str) -> None:
+    (folder / "problem.pddl").write_text(PROBLEM.replace("soda", name))
+    done = bbtc("plan", "domain.pddl", "problem.pddl", "-o", "out.json", folder=folder)
+    assert "\x1b[31m" not in assert_refused(done, folder, place="problem.pddl:")
+
+
+@pytest.mark.parametrize("form", ["dot", "svg", "btcpp", "py_trees"])
+def test_a_hostile_name_in_a_tree_stays_a_name(folder: Path, form: str) -> None:
+    assert bbtc("plan", "domain.pddl", "problem.pddl", "-o", "tree.json", folder=folder).returncode == 0
+    text = (folder / "tree.json").read_text().replace("soda", json.dumps(HOSTILE)[1:-1])
+    (folder / "tree.json").write_text(text)
+    done = bbtc("export", "tree.json", "--to", form, folder=folder)
+    assert done.returncode == 0, done.stderr
+    if form == "py_trees":
+        code = compile(done.stdout, "generated", "exec")
+        assert "os" not in code.co_names
+    if form in {"svg", "btcpp"}:
+        from xml.etree import ElementTree as ET
+
+        ET.fromstring(done.stdout)
+
+
+def test_errors_of_one_run_are_all_reported(folder: Path) -> None:
+    broken = DOMAIN.replace("0.95 (at", "1.2 (at").replace("(known (seen ?item))", "(known (sen ?item))")
+    (folder / "domain.pddl").write_text(broken)
+    text = assert_refused(bbtc("check", "domain.pddl", "problem.pddl", folder=folder), folder)
+    assert len(re.findall(r"error\[", text)) == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["plan"],
+        ["plan", "domain.pddl", "--target", "1.5"],
+        ["plan", "domain.pddl", "--target", "much"],
+        ["plan", "domain.pddl", "--no-such-option"],
+        ["export", "domain.pddl"],
+        ["frobnicate"],
+    ],
+)
+def test_wrong_usage_is_status_2(folder: Path, arguments: list[str]) -> None:
+    done = bbtc(*arguments, folder=folder)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert (folder / "out.json").read_text() == "as it was"
+
+
+def test_a_limit_is_status_3_and_writes_the_best_tree(folder: Path) -> None:
+    done = bbtc("plan", "domain.pddl", "problem.pddl", "--max-nodes", "26", "-o", "out.json", folder=folder)
+    assert done.returncode == 3, done.stderr
+    tree = json.loads((folder / "out.json").read_text())
+    assert (tree["status"], tree["success_probability"]) == ("limit-reached", "7/8")
+
+
+def test_check_writes_nothing_and_fails_on_drift(folder: Path) -> None:
+    plan = ["plan", "domain.pddl", "problem.pddl", "-o", "out.json"]
+    assert_refused(bbtc(*plan, "--check", folder=folder), folder, "as it was")
+    assert bbtc(*plan, folder=folder).returncode == 0
+    before = (folder / "out.json").stat()
+    assert bbtc(*plan, "--check", folder=folder).returncode == 0
+    assert bbtc(*plan, folder=folder).returncode == 0
+    after = (folder / "out.json").stat()
+    assert (before.st_ino, before.st_mtime_ns) == (after.st_ino, after.st_mtime_ns), "unchanged: untouched"
+
+
+def test_input_from_stdin_and_output_to_stdout(folder: Path) -> None:
+    done = bbtc("plan", "-", folder=folder, stdin=DOMAIN + PROBLEM)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["success_probability"] == "31/32"
+
+
+@pytest.mark.parametrize("form", ["json", "sarif", "github"])
+def test_diagnostics_for_machines(folder: Path, form: str) -> None:
+    (folder / "domain.pddl").write_text(DOMAIN.replace("0.95 (at", "1.2 (at"))
+    done = bbtc("check", "--format", form, "domain.pddl", "problem.pddl", folder=folder)
+    assert done.returncode == 1
+    if form == "json":
+        (found,) = json.loads(done.stderr)
+        assert found["place"]["file"] == "domain.pddl"
+        assert found["code"].startswith("BBT")
+    elif form == "sarif":
+        (result,) = json.loads(done.stderr)["runs"][0]["results"]
+        assert result["level"] == "error"
+    else:
+        assert done.stderr.startswith("::error file=domain.pddl,line=")
+
+
+def test_an_output_that_cannot_be_written_is_an_error(folder: Path) -> None:
+    done = bbtc("compile", "domain.pddl", "problem.pddl", "-o", "missing/task.json", folder=folder)
+    assert_refused(done, folder, "missing/task.json")
