@@ -68,12 +68,13 @@ _EXACT_UP_TO = 64  # denominators a fraction is shown with
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """A drawn node. ``lines`` is its text; ``note`` says more, for a tool tip; ``parent`` is the
-    number of the item above it; ``flow`` the probability that a run reaches it; a ``dashed`` one
-    is an action that may run again."""
+    """A drawn node. ``symbol`` is that of a control node, ``lines`` its text; ``note`` says more, for
+    a tool tip; ``parent`` is the number of the item above it; ``flow`` the probability that a run
+    reaches it; a ``dashed`` one is an action that may run again."""
 
     id: str
     kind: Kind
+    symbol: str | None
     lines: tuple[str, ...]
     note: str
     parent: int | None
@@ -91,18 +92,20 @@ def diagram(tree: Tree, figures: Figures | None, *, expand: bool) -> tuple[Item,
         kind = _kind(node, expand)
         flow = None if figures is None else figures.get(node.id, Fraction(0))
         dashed = isinstance(node, ActionNode) and not node.latched
-        items.append(Item(node.id, kind, _lines(tree, node, kind), _note(tree, node), parent, flow, dashed))
+        symbol = SYMBOLS[node.kind] if isinstance(node, ControlNode) and kind != "collapsed" else None
+        lines, note = _lines(tree, node), _note(tree, node)
+        items.append(Item(node.id, kind, symbol, lines, note, parent, flow, dashed))
         if isinstance(node, ControlNode) and kind != "collapsed":
             stack.extend((child, len(items) - 1) for child in reversed(node.children))
     return tuple(items)
 
 
 def _kind(node: Node, expand: bool) -> Kind:
-    if node.template is not None:
-        return "expanded" if expand else "collapsed"
     match node:
-        case ControlNode():
+        case ControlNode(template=None):
             return "control"
+        case ControlNode():
+            return "expanded" if expand else "collapsed"
         case ConditionNode():
             return "condition"
         case ActionNode():
@@ -111,20 +114,18 @@ def _kind(node: Node, expand: bool) -> Kind:
             assert_never(node)
 
 
-def _lines(tree: Tree, node: Node, kind: Kind) -> tuple[str, ...]:
-    label = node.name if node.template is None else node.template
-    lines = [] if label is None else wrap(label)
-    if kind == "collapsed":
-        return tuple(lines)
+def _lines(tree: Tree, node: Node) -> tuple[str, ...]:
+    labels = [label for label in (node.name, node.template) if label is not None]
     match node:
         case ControlNode():
-            return (SYMBOLS[node.kind], *lines)
+            pass
         case ConditionNode():
-            return (*lines, *wrap(describe(tree.task, node.condition)))
+            labels.append(describe(tree.task, node.condition))
         case ActionNode():
-            return (*lines, *wrap(node.action))
+            labels.append(node.action)
         case _:
             assert_never(node)
+    return tuple(line for label in labels for line in wrap(label))
 
 
 def _note(tree: Tree, node: Node) -> str:
@@ -170,7 +171,7 @@ def legend(items: tuple[Item, ...]) -> list[tuple[Kind, str]]:
 
 def symbols_used(items: tuple[Item, ...]) -> list[tuple[str, str]]:
     """The symbols of control nodes that occur, with their meaning."""
-    shown = {item.lines[0] for item in items if item.kind in ("control", "expanded")}
+    shown = {item.symbol for item in items}
     return [(symbol, kind) for kind, symbol in SYMBOLS.items() if symbol in shown]
 
 

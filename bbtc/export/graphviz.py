@@ -21,6 +21,7 @@ from bbtc.export.diagram import (
     FILL,
     INK,
     PEN,
+    SYMBOLS,
     UNREACHED,
     Item,
     diagram,
@@ -29,6 +30,7 @@ from bbtc.export.diagram import (
     line_width,
     symbols_used,
 )
+from bbtc.export.names import printable
 from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.tree.nodes import Tree
 
@@ -36,6 +38,7 @@ FONT = "Helvetica,Arial,sans-serif"
 
 _SECONDS = 60  # that a Graphviz program may take
 _PROGRAMS = ("dot", "graphviz-pure")
+_SKIPPER_STAND_IN = "»"  # the fonts inside graphviz-pure lack the double arrow
 _PLAIN_ID = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
 TEMPLATES = Option(
@@ -138,7 +141,7 @@ def dot_text(tree: Tree, items: tuple[Item, ...], *, with_legend: bool) -> str:
     import graphviz
 
     graph = graphviz.Digraph(
-        name=_escaped([f"{tree.task.domain} {tree.task.problem}"]),
+        name=_escaped([printable(f"{tree.task.domain} {tree.task.problem}")]),
         graph_attr={
             "bgcolor": "white",
             "fontname": FONT,
@@ -147,6 +150,7 @@ def dot_text(tree: Tree, items: tuple[Item, ...], *, with_legend: bool) -> str:
             "rankdir": "TB",
             "ranksep": "0.4",
             "splines": "line",
+            **({"label": _legend_table(items), "labelloc": "b"} if with_legend else {}),
         },
         node_attr={
             "color": PEN,
@@ -160,17 +164,11 @@ def dot_text(tree: Tree, items: tuple[Item, ...], *, with_legend: bool) -> str:
     )
     names = _node_names(items)
     for name, item in zip(names, items, strict=True):
-        graph.node(name, _escaped(item.lines), **_node_attributes(item))
+        lines = item.lines if item.symbol is None else (item.symbol, *item.lines)
+        graph.node(name, _escaped(lines), **_node_attributes(item))
     for name, item in zip(names, items, strict=True):
         if item.parent is not None:
             graph.edge(names[item.parent], name, **_edge_attributes(item))
-    if with_legend:
-        graph.node(
-            _free_name("legend", names),
-            _legend_table(items),
-            shape="plaintext",
-            style="",
-        )
     return str(graph.source)
 
 
@@ -180,12 +178,6 @@ def _node_names(items: tuple[Item, ...]) -> list[str]:
     if all(_PLAIN_ID.fullmatch(name) for name in ids) and len(set(ids)) == len(ids):
         return ids
     return [f"node{number}" for number in range(1, len(items) + 1)]
-
-
-def _free_name(name: str, taken: list[str]) -> str:
-    while name in taken:
-        name += "_"
-    return name
 
 
 def _node_attributes(item: Item) -> dict[str, str]:
@@ -215,19 +207,20 @@ def _escaped(lines: tuple[str, ...] | list[str]) -> str:
     import graphviz
 
     safe = (line.replace("\\", "\\\\").replace("&", "&amp;") for line in lines)
-    return str(graphviz.nohtml("\\n".join(safe)))
+    text: str = graphviz.nohtml("\\n".join(safe))  # a kind of str that is never read as HTML
+    return text
 
 
 def _legend_table(items: tuple[Item, ...]) -> str:
-    rows = [
-        f'<tr><td bgcolor="{FILL[kind]}" width="28"> </td><td align="left">{html_escape(meaning)}</td></tr>'
-        for kind, meaning in legend(items)
+    entries = [
+        (f' bgcolor="{FILL[kind]}" width="28" height="18"', " ", meaning) for kind, meaning in legend(items)
     ]
-    rows += [
-        f'<tr><td>{html_escape(symbol)}</td><td align="left">{html_escape(meaning)}</td></tr>'
-        for symbol, meaning in symbols_used(items)
-    ]
-    return f'<<table border="0" cellborder="1" cellspacing="0" cellpadding="4">{"".join(rows)}</table>>'
+    entries += [(' width="28"', symbol, meaning) for symbol, meaning in symbols_used(items)]
+    cells = (
+        f'<td border="1"{look}>{html_escape(text)}</td><td align="left">{html_escape(meaning)}   </td>'
+        for look, text, meaning in entries
+    )
+    return f'<<table border="0" cellspacing="4"><tr>{"".join(cells)}</tr></table>>'
 
 
 # --- the programs ----------------------------------------------------------------------------
@@ -241,10 +234,13 @@ def _run_graphviz(programs: tuple[str, ...], form: str, text: str, *arguments: s
         if path is None:
             reasons.append(f"there is no program '{program}'")
             continue
+        drawn = text
+        if (program, form) == ("graphviz-pure", "png"):
+            drawn = text.replace(SYMBOLS["skipper"], _SKIPPER_STAND_IN)
         try:
             run = subprocess.run(  # noqa: S603 (a program of a fixed name, its input on stdin)
                 [path, f"-T{form}", *arguments],
-                input=text.encode(),
+                input=drawn.encode(),
                 capture_output=True,
                 timeout=_SECONDS,
                 check=False,

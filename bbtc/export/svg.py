@@ -7,7 +7,18 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from bbtc.export.diagram import FILL, INK, PEN, UNREACHED, Item, flow_text, legend, line_width, symbols_used
+from bbtc.export.diagram import (
+    FILL,
+    INK,
+    PEN,
+    SYMBOLS,
+    UNREACHED,
+    Item,
+    flow_text,
+    legend,
+    line_width,
+    symbols_used,
+)
 from bbtc.export.names import printable
 from bbtc.export.svg_layout import Box, tidy
 from bbtc.tree.nodes import Tree
@@ -89,20 +100,13 @@ def text_width(text: str, size: float) -> float:
 
 
 def _box(item: Item) -> Box:
-    width = max((text_width(line, size) for line, size in _sized(item)), default=0.0)
-    height = sum(size * _LINE for _, size in _sized(item))
+    symbol = 0.0 if item.symbol is None else _SYMBOL
+    width = max((text_width(line, _SIZE) for line in item.lines), default=symbol)
+    height = (symbol + _SIZE * len(item.lines)) * _LINE
     if item.kind == "condition":
         # An ellipse around a rectangle of w x h measures 1.42 w x 1.42 h; text leaves its corners free.
         return Box(1.2 * width + 18, max(1.35 * height + 4, 28.0))
-    if item.kind == "control":
-        return Box(max(width + 12, 34.0), max(height + 4, 28.0))
-    return Box(width + 18, max(height + 10, 28.0))
-
-
-def _sized(item: Item) -> list[tuple[str, float]]:
-    """The lines of an item with their text size; the symbol of a control node is larger."""
-    large = item.kind in ("control", "expanded")
-    return [(line, _SYMBOL if large and not n else _SIZE) for n, line in enumerate(item.lines)]
+    return Box(max(width + 16, 34.0), max(height + (10 if item.lines else 4), 28.0))
 
 
 def _px(value: float) -> str:
@@ -126,14 +130,28 @@ def _draw_item(parent: Element, item: Item, box: Box, x: float, y: float) -> Non
         SubElement(
             group, "rect", {**corner, "width": _px(box.width), "height": _px(box.height), "rx": "2", **look}
         )
-    lines = _sized(item)
-    top = y - sum(size * _LINE for _, size in lines) / 2
-    for line, size in lines:
-        top += size * _LINE
-        place = {"x": _px(x), "y": _px(top - 0.38 * size), "fill": INK[item.kind]}
-        if size != _SIZE:
-            place["font-size"] = _px(size)
+    top = y - (len(item.lines) * _SIZE + (0 if item.symbol is None else _SYMBOL)) * _LINE / 2
+    if item.symbol is not None:
+        _draw_symbol(group, item.symbol, x, top + _SYMBOL * _LINE / 2, INK[item.kind])
+        top += _SYMBOL * _LINE
+    for line in item.lines:
+        top += _SIZE * _LINE
+        place = {"x": _px(x), "y": _px(top - 0.38 * _SIZE), "fill": INK[item.kind]}
         SubElement(group, "text", place).text = line
+
+
+def _draw_symbol(parent: Element, symbol: str, x: float, y: float, ink: str) -> None:
+    """The symbol of a control node; arrows as lines, because many fonts lack the double one."""
+    if symbol == SYMBOLS["fallback"]:
+        size = _px(_SYMBOL)
+        place = {"class": "symbol", "x": _px(x), "y": _px(y + 0.35 * _SYMBOL), "font-size": size, "fill": ink}
+        SubElement(parent, "text", place).text = symbol
+        return
+    if symbol == SYMBOLS["sequence"]:
+        path = f"M {_px(x - 8)} {_px(y)} h 16 m -5 -4 l 5 4 l -5 4"
+    else:
+        path = f"M {_px(x - 8)} {_px(y - 2)} h 13 m -13 4 h 13 m -3 -7 l 6 5 l -6 5"
+    SubElement(parent, "path", {"d": path, "fill": "none", "stroke": ink, "stroke-width": "1.3"})
 
 
 def _draw_line(parent: Element, item: Item, start: tuple[float, float], end: tuple[float, float]) -> None:
@@ -148,13 +166,17 @@ def _draw_line(parent: Element, item: Item, start: tuple[float, float], end: tup
     tip = f"{_px(x2)},{_px(y2)} {_px(x2 - 3)},{_px(y2 - _ARROW)} {_px(x2 + 3)},{_px(y2 - _ARROW)}"
     SubElement(group, "polygon", {"points": tip, "fill": colour})
     if item.flow is not None:
-        SubElement(
-            group,
-            "text",
-            {"x": _px((x1 + 2 * x2) / 3 + 4), "y": _px((y1 + 2 * y2) / 3), "font-size": _px(_SMALL),
-             "text-anchor": "start", "fill": UNREACHED if item.flow == 0 else "#1a1a1a",
-             "stroke": "#ffffff", "stroke-width": "3", "paint-order": "stroke"},
-        ).text = flow_text(item.flow)  # fmt: skip
+        place = {
+            "x": _px((x1 + 2 * x2) / 3 + 4),
+            "y": _px((y1 + 2 * y2) / 3),
+            "font-size": _px(_SMALL),
+            "text-anchor": "start",
+        }
+        # A white rim first, so that the text is read where it stands on a line.
+        rim = {"stroke": "#ffffff", "stroke-width": "3", "aria-hidden": "true"}
+        text = flow_text(item.flow)
+        SubElement(group, "text", {**place, **rim}).text = text
+        SubElement(group, "text", {**place, "fill": colour}).text = text
 
 
 # --- legend ----------------------------------------------------------------------------------
@@ -186,7 +208,7 @@ def _draw_legend(parent: Element, entries: list[tuple[str, str, str, str]], x: f
                 {"x": _px(x), "y": _px(y - 8), "width": "24", "height": "16", "rx": "2", **look},
             )
         if symbol:
-            SubElement(group, "text", {"x": _px(x + 12), "y": _px(y + 5), "font-size": "14"}).text = symbol
+            _draw_symbol(group, symbol, x + 12, y, INK["control"])
         place = {"x": _px(x + 30), "y": _px(y + 4), "text-anchor": "start"}
         SubElement(group, "text", place).text = meaning
         x += _entry_width(meaning)

@@ -12,6 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+_STEEP = 150.0  # how far a line may go sideways before its level gets more room
+_MOST_GAPS = 2.5  # how much more, at most
+
 
 @dataclass(frozen=True, slots=True)
 class Box:
@@ -41,7 +44,8 @@ class _Outline:
 
 def tidy(boxes: Sequence[Box], parents: Sequence[int | None], gap: float, level_gap: float) -> Layout:
     """Place the nodes of a tree. ``parents`` gives the number of each node's parent; parents come
-    before their children, children from left to right."""
+    before their children, children from left to right. ``gap`` is the least distance between
+    neighbours, ``level_gap`` that between levels, which grows where lines would be too flat."""
     children: list[list[int]] = [[] for _ in boxes]
     for number, parent in enumerate(parents):
         if parent is not None:
@@ -67,13 +71,17 @@ def tidy(boxes: Sequence[Box], parents: Sequence[int | None], gap: float, level_
             level[number] = level[parent] + 1
             x[number] = x[parent] + offset[number]
     heights = [0.0] * (max(level) + 1)
+    reach = [0.0] * len(heights)  # how far a line goes sideways on its way up from a level
     for number, box in enumerate(boxes):
         heights[level[number]] = max(heights[level[number]], box.height)
+        reach[level[number]] = max(reach[level[number]], abs(offset[number]))
     middles: list[float] = []
-    top = 0.0
-    for height in heights:
-        middles.append(top + height / 2)
-        top += height + level_gap
+    bottom = 0.0
+    for depth, height in enumerate(heights):
+        if depth:
+            bottom += level_gap * min(max(1.0, reach[depth] / _STEEP), _MOST_GAPS)
+        middles.append(bottom + height / 2)
+        bottom += height
 
     # 3. Shift everything to start at 0.
     outline = outlines[0]
@@ -82,7 +90,7 @@ def tidy(boxes: Sequence[Box], parents: Sequence[int | None], gap: float, level_
         tuple(place - leftmost for place in x),
         tuple(middles[depth] for depth in level),
         max(outline.right) - leftmost,
-        top - level_gap,
+        bottom,
     )
 
 
