@@ -30,11 +30,13 @@ def _ended(world: ScriptedWorld, success: bool) -> Run:
 
 
 class PyTreesReplay:
-    """The exported module of a tree, ready to run any number of scripts."""
+    """The exported module of a tree, ready to run any number of scripts. :attr:`world` is that of
+    the last one."""
 
     def __init__(self, tree: Tree) -> None:
         self._task = tree.task
         self._names = py_trees_names(tree)
+        self.world: ScriptedWorld | None = None
         self.source = py_trees.export(tree, {}, None)
         self._module = types.ModuleType("exported")
         exec(compile(self.source, "<exported>", "exec"), self._module.__dict__)
@@ -43,7 +45,7 @@ class PyTreesReplay:
         """Replay one script in a new instance of the tree."""
         import py_trees as engine
 
-        world = ScriptedWorld(self._task, script, timing)
+        world = self.world = ScriptedWorld(self._task, script, timing)
         root = self._module.create_root(self._robot(world, engine.common.Status))
         try:
             for _ in range(world.most_ticks()):
@@ -77,7 +79,8 @@ class PyTreesReplay:
 
 
 class BtcppReplay:
-    """The exported XML of a tree, loaded into BehaviorTree.CPP once for any number of scripts."""
+    """The exported XML of a tree, loaded into BehaviorTree.CPP once for any number of scripts.
+    :attr:`world` is that of the last one."""
 
     def __init__(self, tree: Tree) -> None:
         import behaviortreepy as engine
@@ -88,7 +91,7 @@ class BtcppReplay:
         self.source = btcpp.export(tree, {"model": True}, None)
         self._factory = engine.BehaviorTreeFactory()
         self._error: Exception | None = None
-        self._world: ScriptedWorld | None = None
+        self.world: ScriptedWorld | None = None
         document = ET.fromstring(self.source)
         self._main = document.attrib["main_tree_to_execute"]
         self._register(document, self._names)
@@ -97,7 +100,7 @@ class BtcppReplay:
     def run(self, script: Script, timing: Timing = "between") -> Run:
         """Replay one script in a new instance of the tree."""
         status = self._engine.NodeStatus
-        world = self._world = ScriptedWorld(self._task, script, timing)
+        world = self.world = ScriptedWorld(self._task, script, timing)
         root = self._factory.create_tree(self._main)
         for _ in range(world.most_ticks()):
             returned = root.tick_exactly_once()
@@ -153,10 +156,10 @@ class BtcppReplay:
         def safely(callback: Callable[[Any, ScriptedWorld], object]) -> Callable[[Any], object]:
             # The engine turns an exception into FAILURE: keep it, and tell after the tick.
             def safe(node: Any) -> object:
-                assert self._world is not None
+                assert self.world is not None
                 if self._error is None:
                     try:
-                        return callback(node, self._world)
+                        return callback(node, self.world)
                     except Exception as error:  # noqa: BLE001
                         self._error = error
                 return status.FAILURE

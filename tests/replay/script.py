@@ -65,11 +65,13 @@ class ScriptedWorld:
     def __init__(self, task: Task, script: Script, timing: Timing) -> None:
         self.values = script.initial
         self.actions: list[str] = []
+        self.cancelled: list[str] = []
         self.timing = timing
         self._index = task.variable_index
         self._script = script
         self._pending: Values | None = None
         self._ticks_run: dict[Hashable, int] = {}
+        self._action_of: dict[Hashable, str] = {}
 
     def read(self, variable: str) -> int:
         """The value of a variable, by name."""
@@ -87,6 +89,7 @@ class ScriptedWorld:
             return True
         self._pending = after
         self._ticks_run[runner] = 1
+        self._action_of[runner] = action
         return False
 
     def running(self, runner: Hashable) -> bool:
@@ -107,6 +110,7 @@ class ScriptedWorld:
     def cancel(self, runner: Hashable) -> None:
         """A running action is no longer wanted."""
         assert runner in self._ticks_run, "only what runs is cancelled"
+        self.cancelled.append(self._action_of[runner])
         del self._ticks_run[runner]
 
     def between_ticks(self) -> None:

@@ -1,0 +1,117 @@
+"""Formats are found by name; plugins join by entry point; whatever goes wrong is a diagnostic."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from bbtc.diagnostics import BbtcError
+from bbtc.export import registry
+from bbtc.export.registry import Exporter, Option, format_names, load_exporter, parse_options
+
+
+class Plain:
+    """An exporter as a plugin would have it."""
+
+    name = "plain"
+    description = "for tests"
+    suffix = ".txt"
+    options = (
+        Option("depth", 3, "levels"),
+        Option("color", False, "colors"),
+        Option("style", "wide", "layout", ("wide", "narrow")),
+        Option("title", "", "any text"),
+    )
+
+    def export(self, tree: object, options: object, figures: object) -> str:
+        """Nothing to see."""
+        return ""
+
+
+plain = Plain()
+not_an_exporter = 7
+
+
+def install(monkeypatch: pytest.MonkeyPatch, **plugins: str) -> None:
+    """Make entry points of the group visible, by name and value."""
+    points = [EntryPoint(name, value, registry.GROUP) for name, value in plugins.items()]
+    monkeypatch.setattr(registry, "entry_points", lambda group: points if group == registry.GROUP else [])
+
+
+def code_of(error: pytest.ExceptionInfo[BbtcError]) -> str:
+    """The code of the only diagnostic."""
+    (diagnostic,) = error.value.diagnostics
+    return diagnostic.code
+
+
+@pytest.mark.parametrize("name", ["btcpp", "py_trees"])
+def test_built_ins_keep_the_protocol(name: str) -> None:
+    exporter = load_exporter(name)
+    assert isinstance(exporter, Exporter)
+    assert exporter.name == name
+    assert exporter.suffix.startswith(".")
+    assert "\n" not in exporter.description
+    assert all(option.help for option in exporter.options)
+
+
+def test_an_unknown_format_is_an_error_with_the_nearest_name() -> None:
+    with pytest.raises(BbtcError) as error:
+        load_exporter("bt_cpp")
+    assert code_of(error) == "BBT0701"
+    assert error.value.diagnostics[0].hint == "did you mean 'btcpp'?"
+
+
+def test_a_plugin_is_a_format_like_any_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, plain=f"{__name__}:plain")
+    monkeypatch.setattr(EntryPoint, "load", lambda self: plain)
+    assert format_names()[-1] == "plain"
+    assert load_exporter("plain") is plain
+
+
+def test_a_plugin_with_the_name_of_a_built_in_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, dot="elsewhere:dot")
+    with pytest.raises(BbtcError) as error:
+        load_exporter("dot")
+    assert code_of(error) == "BBT0702"
+    assert "elsewhere:dot" in str(error.value)
+    assert load_exporter("btcpp").name == "btcpp"
+
+
+@pytest.mark.parametrize("value", ["no.such.module:x", "bbtc.export.registry:no_such_object"])
+def test_a_plugin_that_does_not_load_is_an_error(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    install(monkeypatch, mine=value)
+    with pytest.raises(BbtcError) as error:
+        load_exporter("mine")
+    assert code_of(error) == "BBT0703"
+
+
+def test_a_plugin_that_is_no_exporter_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, mine=f"{__name__}:not_an_exporter")
+    monkeypatch.setattr(EntryPoint, "load", lambda self: not_an_exporter)
+    with pytest.raises(BbtcError) as error:
+        load_exporter("mine")
+    assert code_of(error) == "BBT0703"
+
+
+def test_options_are_typed_and_have_defaults() -> None:
+    assert parse_options(plain, {}) == {"depth": 3, "color": False, "style": "wide", "title": ""}
+    given = {"depth": "-12", "color": "yes", "style": "narrow", "title": "a=b"}
+    assert parse_options(plain, given) == {"depth": -12, "color": True, "style": "narrow", "title": "a=b"}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("deptth", "1", "did you mean 'depth'?"),
+        ("depth", "many", "a whole number"),
+        ("depth", "9" * 5000, "a whole number"),
+        ("color", "blue", "true or false"),
+        ("style", "tall", "wide or narrow"),
+    ],
+)
+def test_a_wrong_option_is_an_error(key: str, value: str, says: str) -> None:
+    with pytest.raises(BbtcError) as error:
+        parse_options(plain, {key: value})
+    assert code_of(error) == "BBT0704"
+    assert says in str(error.value)
