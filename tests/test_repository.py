@@ -1,0 +1,164 @@
+"""The repository keeps its own rules: layers, sizes, codes, README commands, what a wheel holds."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bbtc.codes import CODES
+from bbtc.export.registry import BUILT_INS, load_exporter
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+SOURCES = sorted((REPOSITORY / "bbtc").rglob("*.py"))
+
+MOST_MODULE_LINES = 600
+MOST_FUNCTION_LINES = 80
+
+
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+def functions() -> Iterator[tuple[Path, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(text_of(path))):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                yield path, node
+
+
+def test_imports_keep_to_the_layers() -> None:
+    pytest.importorskip("importlinter", reason="import-linter is not installed")
+    script = Path(sys.executable).parent / "lint-imports"
+    run = subprocess.run(
+        [script, "--no-cache"], cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+def test_no_module_is_too_long() -> None:
+    long = {str(path): text_of(path).count("\n") for path in SOURCES}
+    assert {name: lines for name, lines in long.items() if lines > MOST_MODULE_LINES} == {}
+
+
+def test_no_function_is_too_long() -> None:
+    long = [
+        f"{path.name}:{node.lineno} {node.name}"
+        for path, node in functions()
+        if (node.end_lineno or 0) - node.lineno >= MOST_FUNCTION_LINES
+    ]
+    assert long == []
+
+
+def test_every_module_postpones_annotations() -> None:
+    line = "from __future__ import annotations"
+    assert [
+        str(path) for path in SOURCES if text_of(path).count("\n") > 1 and line not in text_of(path)
+    ] == []
+
+
+def test_every_code_is_registered_and_used() -> None:
+    used = {
+        code
+        for path in SOURCES
+        if path.name != "codes.py"
+        for code in re.findall(r"\bBBT\d{4}\b", text_of(path))
+    }
+    assert used - CODES.keys() == set(), "codes that are not registered"
+    assert CODES.keys() - used == set(), "codes that nothing reports"
+
+
+@pytest.mark.parametrize("name", BUILT_INS)
+def test_built_in_exporters_are_what_they_are_registered_as(name: str) -> None:
+    exporter = load_exporter(name)
+    assert exporter.name == name
+    assert exporter.description
+    assert exporter.suffix.startswith(".")
+    assert len({option.name for option in exporter.options}) == len(exporter.options)
+
+
+# --- commands --------------------------------------------------------------------------------
+
+
+def test_the_readme_names_targets_that_exist() -> None:
+    blocks = re.findall(r"^```\w*\n(.*?)^```", text_of(REPOSITORY / "README.md"), re.DOTALL | re.MULTILINE)
+    named = re.findall(r"^(?:\$ )?make (\w+)", "\n".join(blocks), re.MULTILINE)
+    targets = re.findall(r"^([\w-]+):", text_of(REPOSITORY / "Makefile"), re.MULTILINE)
+    assert {"demo", "test"} <= set(named) <= set(targets)
+
+
+def test_links_between_documents_lead_somewhere() -> None:
+    pages = [
+        REPOSITORY / "README.md",
+        REPOSITORY / "CHANGELOG.md",
+        *sorted((REPOSITORY / "docs").rglob("*.md")),
+    ]
+    broken = [
+        f"{page.relative_to(REPOSITORY)}: {target}"
+        for page in pages
+        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text_of(page))
+        if "://" not in target and not (page.parent / target).exists()
+    ]
+    assert broken == []
+
+
+# --- the wheel -------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    pytest.importorskip("hatchling", reason="hatchling is not installed")
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
+        cwd=REPOSITORY,
+        capture_output=True,
+        check=True,
+        timeout=120,
+    )
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_the_wheel_holds_the_package_and_the_grammar_and_nothing_else(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        grammar = archive.read("bbtc/grammar/bbtc.lark")
+    assert grammar == (REPOSITORY / "grammar" / "bbtc.lark").read_bytes()
+    assert "bbtc/py.typed" in names
+    modules = {str(path.relative_to(REPOSITORY).as_posix()) for path in SOURCES}
+    assert modules <= names
+    tops = {name.partition("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"bbtc"}
+
+
+def test_an_installed_wheel_reads_a_domain(wheel: Path, tmp_path: Path) -> None:
+    installed = tmp_path / "site"
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(installed)
+    folder = REPOSITORY / "domains" / "household"
+    code = "import sys; sys.path.insert(0, sys.argv.pop(1)); from bbtc.cli.main import main; main()"
+    # First on the path, the wheel hides the sources of this repository.
+    run = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            code,
+            installed,
+            "check",
+            folder / "domain.pddl",
+            folder / "look-for-soda.pddl",
+        ],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert run.returncode == 0, run.stderr
