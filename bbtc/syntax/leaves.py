@@ -16,6 +16,7 @@ from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
 from bbtc.syntax.ast import Assign, Atom, FluentRef, FluentValue, Name, Number, Term, TypedGroup, Variable
 from bbtc.syntax.engine import Token
+from bbtc.syntax.scan import without_comments
 
 SOURCE: ContextVar[SourceFile] = ContextVar("SOURCE")
 """The file that is being parsed: the builder's functions keep no state, but spans need it."""
@@ -36,6 +37,7 @@ _assign_atom, _assign_value, _assign_span = (_setter(Assign, s) for s in ("atom"
 
 _WORD = re.compile(r"\??[^\s()?]+")
 _GROUP = re.compile(r"([^\s-].*?)\s+-\s*(\S+)", re.DOTALL)
+_TOKEN = re.compile(r"[()]|[^\s()]+")
 _FACT = re.compile(r"\(([^()]*)\)|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
 
 NUMBER_LENGTH = 200
@@ -184,10 +186,5 @@ def number(text: str, span: Span) -> Number:
 def plain_text(first: Token, last: Token) -> str:
     """The source from one token to another on one line, without comments."""
     source = SOURCE.get()
-    raw = _COMMENT.sub("", source.text[first.start : last.end])
-    return _PADDING.sub("", _SPACE.sub(" ", raw))
-
-
-_COMMENT = re.compile(r";[^\r\n]*")
-_SPACE = re.compile(r"\s+")
-_PADDING = re.compile(r"(?<=\() | (?=\))")
+    words = " ".join(_TOKEN.findall(without_comments(source.text[first.start : last.end])))
+    return words.replace("( ", "(").replace(" )", ")")

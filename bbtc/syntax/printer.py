@@ -1,0 +1,390 @@
+"""The canonical layout of a document: parsing what is printed gives an equal tree."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from typing_extensions import assert_never
+
+from bbtc.kleene import Truth
+from bbtc.source import Span
+from bbtc.syntax import ast
+from bbtc.syntax.layout import Doc, Setter
+from bbtc.syntax.scan import without_comments
+
+_TOKEN = re.compile(r"[()]|[^\s()]+")
+
+
+def print_document(document: ast.Document) -> str:
+    """The text of a document, comments in place."""
+    docs = _Docs(without_comments(document.source.text))
+    whole = Span(document.source, 0, len(document.source.text) + 1)
+    definitions = tuple(docs.definition(definition) for definition in document.definitions)
+    return Setter(document.comments).run(Doc("", definitions, span=whole, broken=True))
+
+
+def print_formula(formula: ast.Formula) -> str:
+    """A formula on one line."""
+    return _Docs("").formula(formula).flat
+
+
+def print_effect(effect: ast.Effect) -> str:
+    """An effect on one line."""
+    return _Docs("").effect(effect).flat
+
+
+class _Docs:
+    """Makes the forms of nodes. ``text`` is the source without comments; it is empty for nodes that
+    come from nowhere, whose words then have no places."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    # --- places ------------------------------------------------------------------------------
+
+    def _word(self, word: str, after: int, span: Span) -> Span | None:
+        """Where a keyword stands that the tree does not keep: the first one after an offset."""
+        match = re.compile(re.escape(word), re.IGNORECASE).search(self._text, after, span.end)
+        return Span(span.source, match.start(), match.end()) if match else None
+
+    def _parentheses(self, after: int, last: int, span: Span) -> Span | None:
+        """The parentheses around something that ends at ``last``; they open after an offset."""
+        start = self._text.find("(", after, span.end)
+        end = self._text.find(")", max(last, start), span.end)
+        return Span(span.source, start, end + 1) if start >= 0 and end >= 0 else None
+
+    # --- files and sections ------------------------------------------------------------------
+
+    def definition(self, node: ast.Definition) -> Doc:
+        name = _leaf(node.name)
+        head_span = self._parentheses(node.span.start + 1, node.name.span.end, node.span)
+        head = Doc(f"({node.kind}", (name,), ")", head_span, glued=1)
+        sections = tuple(self.section(section) for section in node.sections)
+        return Doc("(define", (head, *sections), ")", node.span, glued=1, broken=True, spaced=True)
+
+    def section(self, node: ast.Section) -> Doc:
+        match node:
+            case ast.Requirements():
+                return Doc("(:requirements", tuple(map(_leaf, node.keys)), ")", node.span, filled=True)
+            case ast.TypedSection():
+                return Doc(f"(:{node.kind}", self.groups(node.entries), ")", node.span)
+            case ast.Predicates():
+                return self.listed("(:predicates", map(self.predicate, node.declarations), node)
+            case ast.Functions():
+                return self.listed("(:functions", map(self.function, node.declarations), node)
+            case ast.Action() | ast.Template() | ast.Sensor():
+                return self.schema(node)
+            case ast.Derived():
+                return self.derived(node)
+            case ast.DomainReference():
+                return Doc("(:domain", (_leaf(node.name),), ")", node.span, glued=1)
+            case ast.Init():
+                return self.listed("(:init", map(self.initial, node.elements), node)
+            case ast.Hidden():
+                return Doc("(:hidden", tuple(map(self.initial, node.facts)), ")", node.span)
+            case ast.Goal():
+                return Doc("(:goal", (self.formula(node.formula),), ")", node.span, glued=1)
+            case ast.GoalNumber():
+                return Doc(f"(:{node.kind}", (_number(node.value),), ")", node.span, glued=1)
+            case ast.Metric():
+                expression = self.expression(node.expression)
+                return Doc(f"(:metric {node.direction}", (expression,), ")", node.span, glued=1)
+            case ast.Unsupported():
+                return self.unsupported(node)
+            case _:
+                assert_never(node)
+
+    def observed(self, content: ast.Formula | ast.Probabilistic) -> Doc:
+        return self.effect(content) if isinstance(content, ast.Probabilistic) else self.formula(content)
+
+    def listed(self, head: str, items: Iterable[Doc], node: ast.Predicates | ast.Functions | ast.Init) -> Doc:
+        """A section that is a list: one item a line, if there are several."""
+        parts = tuple(items)
+        return Doc(head, parts, ")", node.span, broken=len(parts) > 1)
+
+    def schema(self, node: ast.Action | ast.Template | ast.Sensor) -> Doc:
+        """An action, a template or a sensor: name, parameters, and the fields that are given."""
+        after, span = node.name.span.end, node.span
+        fields: list[Doc] = []
+        if node.parameters or isinstance(node, ast.Action):
+            fields.append(self.parameters(node.parameters, after, span, ":parameters"))
+        for word, value in _fields(node):
+            match value:
+                case None:
+                    continue
+                case ast.Observation():
+                    doc = self.observed(value.content)
+                case _ if word == ":effect":
+                    doc = self.effect(value)
+                case _ if word == ":body":
+                    doc = self.body(value)
+                case _:
+                    doc = self.formula(value)
+            fields.append(self.field(word, doc, after, span))
+        head = f"(:{type(node).__name__.lower()}"
+        return Doc(
+            head, (_leaf(node.name), *_in_source_order(fields)), ")", span, 1, broken=True, spaced=True
+        )
+
+    def field(self, word: str, value: Doc, after: int, span: Span) -> Doc:
+        """``:word value``."""
+        place = self._word(word, after, span)
+        whole = Span(span.source, place.start, value.span.end) if place and value.span else value.span
+        return Doc(word, (value,), "", whole, glued=1)
+
+    def parameters(self, entries: ast.TypedList, after: int, span: Span, word: str = "") -> Doc:
+        """``(?x ?y - t)``, after a keyword or not."""
+        place = self._word(word, after, span) if word else None
+        if word and place is None:
+            return Doc(f"{word} (", self.groups(entries), ")", span._replace(start=after, end=after))
+        start = place.end if place else after
+        last = entries[-1].span.end if entries else start
+        around = self._parentheses(start, last, span)
+        whole = Span(span.source, place.start, around.end) if place and around else around
+        opening = f"{word} (" if word else "("
+        return Doc(opening, self.groups(entries), ")", whole, glued=1, filled=True)
+
+    def derived(self, node: ast.Derived) -> Doc:
+        condition = self.formula(node.condition)
+        if node.kind == "derived":
+            head = Doc(
+                f"({node.head.predicate.text}", self.groups(node.parameters), ")", node.head.span, filled=True
+            )
+            return Doc("(:derived", (head, condition), ")", node.span, glued=1, spaced=True)
+        start, span = node.span.start, node.span
+        fields = [
+            self.parameters(node.parameters, start, span, ":vars") if node.parameters else None,
+            self.field(":context", condition, start, span),
+            self.field(":implies", self.atom(node.head), start, span),
+        ]
+        parts = _in_source_order([part for part in fields if part])
+        return Doc("(:axiom", parts, ")", span, broken=True, spaced=True)
+
+    # --- declarations ------------------------------------------------------------------------
+
+    def groups(self, entries: ast.TypedList) -> tuple[Doc, ...]:
+        return tuple(map(self.group, entries))
+
+    def group(self, node: ast.TypedGroup) -> Doc:
+        names = tuple(map(_leaf, node.names))
+        if not node.types:
+            return Doc("", names, "", node.span, filled=True)
+        types = [_leaf(name) for name in node.types]
+        first, last = node.types[0].span, node.types[-1].span
+        span = Span(first.source, first.start, last.end)
+        kind = Doc(f"- {types[0].open}", span=span)
+        if len(types) > 1:
+            kind = Doc("- (either", tuple(types), ")", span._replace(end=node.span.end), filled=True)
+        return Doc("", (*names, kind), "", node.span, filled=True)
+
+    def predicate(self, node: ast.PredicateDeclaration) -> Doc:
+        if not node.three_valued:
+            return Doc(f"({node.name.text}", self.groups(node.parameters), ")", node.span, filled=True)
+        last = node.parameters[-1].span.end if node.parameters else node.name.span.end
+        span = self._parentheses(node.span.start + 1, last, node.span)
+        inner = Doc(f"({node.name.text}", self.groups(node.parameters), ")", span, filled=True)
+        return Doc("(unknown", (inner,), ")", node.span, glued=1)
+
+    def function(self, node: ast.FunctionDeclaration) -> Doc:
+        types = " ".join(name.text for name in node.types)
+        close = f") - {types}" if len(node.types) == 1 else f") - (either {types})" if types else ")"
+        return Doc(f"({node.name.text}", self.groups(node.parameters), close, node.span, filled=True)
+
+    # --- problems ----------------------------------------------------------------------------
+
+    def initial(self, node: ast.InitElement) -> Doc:
+        match node:
+            case ast.InitAnd():
+                return Doc("(and", tuple(map(self.initial, node.parts)), ")", node.span)
+            case ast.FluentValue():
+                return Doc("(=", (self.fluent(node.fluent), _number(node.value)), ")", node.span, glued=2)
+            case ast.InitClause():
+                return self.formula(node.formula)
+            case ast.Invariant():
+                return Doc("(invariant", tuple(map(self.formula, node.parts)), ")", node.span)
+            case (
+                ast.Assign()
+                | ast.EffectForall()
+                | ast.Probabilistic()
+                | ast.OneOf()
+                | ast.Unsupported()
+                | ast.Empty()
+            ):
+                return self.effect(node)
+            case _:
+                assert_never(node)
+
+    # --- formulas ----------------------------------------------------------------------------
+
+    def formula(self, node: ast.Formula) -> Doc:
+        match node:
+            case ast.Atom():
+                return self.atom(node)
+            case ast.Empty():
+                return Doc("(", (), ")", node.span)
+            case ast.Equality():
+                return Doc("(=", (_leaf(node.left), _leaf(node.right)), ")", node.span, glued=2)
+            case ast.Not():
+                return Doc("(not", (self.formula(node.part),), ")", node.span, glued=1)
+            case ast.And():
+                return Doc("(and", tuple(map(self.formula, node.parts)), ")", node.span)
+            case ast.Or():
+                return Doc("(or", tuple(map(self.formula, node.parts)), ")", node.span)
+            case ast.Imply():
+                parts = (self.formula(node.premise), self.formula(node.conclusion))
+                return Doc("(imply", parts, ")", node.span)
+            case ast.Quantified():
+                typed = self.parameters(node.parameters, node.span.start + 1, node.span)
+                return Doc(f"({node.kind}", (typed, self.formula(node.part)), ")", node.span, glued=1)
+            case ast.Test():
+                return Doc(f"({node.kind}", (self.atom(node.atom),), ")", node.span, glued=1)
+            case ast.Unsupported():
+                return self.unsupported(node)
+            case _:
+                assert_never(node)
+
+    def atom(self, node: ast.Atom) -> Doc:
+        """``(p a ?x)``."""
+        return Doc(f"({node.predicate.text}", tuple(map(_leaf, node.args)), ")", node.span, filled=True)
+
+    # --- effects -----------------------------------------------------------------------------
+
+    def effect(self, node: ast.Effect) -> Doc:
+        match node:
+            case ast.Empty():
+                return Doc("(", (), ")", node.span)
+            case ast.Assign():
+                return self.assign(node)
+            case ast.EffectAnd():
+                return Doc("(and", tuple(map(self.effect, node.parts)), ")", node.span)
+            case ast.When():
+                return Doc(
+                    "(when", (self.formula(node.condition), self.effect(node.effect)), ")", node.span, glued=1
+                )
+            case ast.EffectForall():
+                typed = self.parameters(node.parameters, node.span.start + 1, node.span)
+                return Doc("(forall", (typed, self.effect(node.effect)), ")", node.span, glued=1)
+            case ast.Probabilistic():
+                return Doc("(probabilistic", tuple(map(self.branch, node.branches)), ")", node.span)
+            case ast.OneOf():
+                return Doc("(oneof", tuple(map(self.effect, node.parts)), ")", node.span)
+            case ast.FluentEffect():
+                parts = (self.fluent(node.fluent), self.expression(node.amount))
+                return Doc(f"({node.operator}", parts, ")", node.span, glued=1)
+            case ast.Unsupported():
+                return self.unsupported(node)
+            case _:
+                assert_never(node)
+
+    def assign(self, node: ast.Assign) -> Doc:
+        atom = self.atom(node.atom)
+        match node.value:
+            case Truth.TRUE:
+                return atom
+            case Truth.FALSE:
+                return Doc("(not", (atom,), ")", node.span, glued=1)
+            case Truth.UNKNOWN:
+                return Doc("(unknown", (atom,), ")", node.span, glued=1)
+            case _:
+                assert_never(node.value)
+
+    def branch(self, node: ast.Branch) -> Doc:
+        """``0.5 effect``."""
+        return Doc(node.probability.text, (self.effect(node.effect),), "", node.span, glued=1)
+
+    # --- numbers -----------------------------------------------------------------------------
+
+    def fluent(self, node: ast.FluentRef) -> Doc:
+        return Doc(f"({node.name.text}", tuple(map(_leaf, node.args)), ")", node.span, filled=True)
+
+    def expression(self, node: ast.NumericExpression) -> Doc:
+        match node:
+            case ast.Number():
+                return _number(node)
+            case ast.FluentRef():
+                return self.fluent(node)
+            case ast.Arithmetic():
+                operands = tuple(map(self.expression, node.operands))
+                return Doc(f"({node.operator}", operands, ")", node.span, filled=True)
+            case _:
+                assert_never(node)
+
+    # --- bodies ------------------------------------------------------------------------------
+
+    def body(self, node: ast.Body) -> Doc:
+        match node:
+            case ast.BodyControl():
+                return Doc(f"({node.kind}", tuple(map(self.body, node.children)), ")", node.span)
+            case ast.BodyCondition():
+                return Doc("(condition", (self.formula(node.formula),), ")", node.span, glued=1)
+            case ast.BodyCall():
+                words = (node.name, *node.args)
+                if node.kind is None:
+                    return Doc(
+                        f"({node.name.text}", tuple(map(_leaf, node.args)), ")", node.span, filled=True
+                    )
+                return Doc(f"({node.kind}", tuple(map(_leaf, words)), ")", node.span, filled=True)
+            case ast.BodyForeach():
+                typed = self.parameters(node.parameters, node.span.start + 1, node.span)
+                return Doc("(foreach", (typed, self.body(node.child)), ")", node.span, glued=1)
+            case _:
+                assert_never(node)
+
+    # --- what is refused by name -------------------------------------------------------------
+
+    def unsupported(self, node: ast.Unsupported) -> Doc:
+        """The form as it stands in the source, or as the node's text has it."""
+        _, start, end = node.span
+        text = self._text
+        if not text[start:end].strip():
+            text, start, end = node.text, 0, len(node.text)
+        stack: list[tuple[int, str, list[Doc]]] = []
+        opening = -1
+        for match in _TOKEN.finditer(text, start, end):
+            at, mark = match.start(), match.group()
+            if opening >= 0:
+                # The first word of a form stands with its parenthesis.
+                word = "" if mark in {"(", ")"} else mark
+                stack.append((opening, f"({word}", []))
+                opening = -1
+                if word:
+                    continue
+            if mark == "(":
+                opening = at
+                continue
+            doc = Doc(mark, span=Span(node.span.source, at, match.end()))
+            if mark == ")":
+                first, head, items = stack.pop()
+                doc = Doc(head, tuple(items), ")", Span(node.span.source, first, match.end()), filled=True)
+                if not stack:
+                    return doc
+            stack[-1][2].append(doc)
+        return Doc(node.text, span=node.span)
+
+
+def _fields(node: ast.Action | ast.Template | ast.Sensor) -> list[tuple[str, Any]]:
+    match node:
+        case ast.Action():
+            observed = (":observe", node.observe)
+            return [(":precondition", node.precondition), observed, (":effect", node.effect)]
+        case ast.Template():
+            return [(":precondition", node.precondition), (":effect", node.effect), (":body", node.body)]
+        case ast.Sensor():
+            return [(":condition", node.condition), (":sensed", node.sensed)]
+        case _:
+            assert_never(node)
+
+
+def _in_source_order(fields: list[Doc]) -> tuple[Doc, ...]:
+    """The fields as the author ordered them: a comment may refer to what stands before it."""
+    return tuple(sorted(fields, key=lambda field: field.span.start if field.span else 0))
+
+
+def _leaf(node: ast.Term) -> Doc:
+    return Doc(node.text, span=node.span)
+
+
+def _number(node: ast.Number) -> Doc:
+    return Doc(node.text, span=node.span)
