@@ -14,9 +14,9 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from bbtc.ground.universe import Row
 from bbtc.limits import Limits
 
-Row = tuple[int, ...]
 _CHUNK = 1 << 20
 
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
-from bbtc.ground.atoms import Atoms, Binding
+from bbtc.ground.atoms import Atoms
 from bbtc.ground.condition import FALSE, TRUE, Condition
-from bbtc.ground.normal import Block, Chance
+from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin
+from bbtc.ground.normal import Block, Chance, Item, free
 from bbtc.ground.task import Effect, Factor, Outcome
+from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
+from bbtc.model import formula as mf
+from bbtc.model.types import Parameter
 
 ZERO = Fraction(0)
 ONE = Fraction(1)
@@ -31,144 +35,285 @@ class _Part:
 
     def effects(self) -> tuple[Effect, ...]:
         """The settings as effects, unconditional ones first, in order of variables."""
-        ordered = sorted(self.sets.items(), key=lambda entry: entry[0] != TRUE)
+        ordered = sorted(self.sets.items(), key=lambda entry: entry[0] is not TRUE)
         return tuple(
-            Effect(None if guard == TRUE else guard, tuple(sorted(sets.items()))) for guard, sets in ordered
+            Effect(None if guard is TRUE else guard, tuple(sorted(sets.items()))) for guard, sets in ordered
         )
 
 
-class EffectGrounder:
-    """Grounds the effects of one model. ``guide`` effects of templates give no costs."""
+# --- quantifiers with guards -------------------------------------------------------------------
 
-    def __init__(self, atoms: Atoms, report: Report) -> None:
-        self.atoms = atoms
+
+class _Loop:
+    """The bindings of some parameters under which a guard may be true. Each part of the guard is
+    looked at as soon as what it reads is bound."""
+
+    def __init__(
+        self,
+        lowering: Lowering,
+        frame: Frame,
+        parameters: tuple[Parameter, ...],
+        guard: tuple[mf.Formula, ...],
+    ) -> None:
+        pending = list(guard)
+        later = {parameter.name for parameter in parameters}
+        self._first = self._ready(lowering, frame, pending, later)
+        self._levels: list[tuple[int, tuple[int, ...], list[Lowered]]] = []
+        for parameter in parameters:
+            later.discard(parameter.name)
+            slot, members = frame.slot(parameter.name), lowering.universe.members(parameter.types)
+            self._levels.append((slot, members, self._ready(lowering, frame, pending, later)))
+        self.trivial = not self._levels and not self._first
+
+    @staticmethod
+    def _ready(lowering: Lowering, frame: Frame, pending: list[mf.Formula], later: set[str]) -> list[Lowered]:
+        ready = [part for part in pending if later.isdisjoint(free(part))]
+        pending[:] = [part for part in pending if not later.isdisjoint(free(part))]
+        return [lowering.normal(part, frame, strict=True) for part in ready]
+
+    def guards(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
+        """For each binding, which is then in ``env``: the guard's conditions (no constants),
+        together with those above."""
+        conditions = _met(self._first, env, above)
+        if conditions is not None:
+            yield from self._enter(0, env, conditions)
+
+    def _enter(self, level: int, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
+        if level == len(self._levels):
+            yield above
+            return
+        slot, members, parts = self._levels[level]
+        for env[slot] in members:
+            conditions = _met(parts, env, above)
+            if conditions is not None:
+                yield from self._enter(level + 1, env, conditions)
+
+
+def _met(parts: list[Lowered], env: Env, above: list[Condition]) -> list[Condition] | None:
+    """The conditions of the parts after those above; None if one is false."""
+    if not parts:
+        return above
+    found = list(above)
+    for part in parts:
+        condition = part(env)
+        if condition is FALSE:
+            return None
+        if condition is not TRUE:
+            found.append(condition)
+    return found
+
+
+# --- compiled effects ----------------------------------------------------------------------------
+
+
+class EffectLowering:
+    """Compiles the effects of one model."""
+
+    def __init__(self, lowering: Lowering, report: Report) -> None:
+        self.lowering = lowering
+        self.atoms: Atoms = lowering.atoms
         self.report = report
 
-    def factors(self, block: Block, binding: Binding) -> tuple[tuple[Factor, ...], Fraction]:
+    def effect(self, block: Block, frame: Frame) -> LoweredEffect:
+        """The effect of an action or of a template's guide."""
+        return LoweredEffect(self, block, frame)
+
+
+class LoweredEffect:
+    """A compiled block."""
+
+    def __init__(self, owner: EffectLowering, block: Block, frame: Frame) -> None:
+        self._owner = owner
+        self._pairs = owner.atoms.pairs
+        self._plain: list[tuple[Callable[[Env], int | None], Truth]] = []
+        self._items: list[tuple[_Loop, _Leaf]] = []
+        for item in block.items:
+            self._add(item, frame)
+        self._chances = [_LoweredChance(owner, chance, frame) for chance in block.chances]
+
+    def _add(self, item: Item, frame: Frame) -> None:
+        loop = _Loop(self._owner.lowering, frame, item.parameters, item.guard)
+        leaf = item.leaf
+        if isinstance(leaf, me.Add):
+            self._items.append((loop, _Addition(self._owner, leaf, frame)))
+            return
+        number = _number(self._owner.atoms.numbers[leaf.predicate], frame.rows(leaf.args))
+        if loop.trivial:
+            self._plain.append((number, leaf.value))
+        else:
+            self._items.append((loop, _Setting(number, leaf.value)))
+
+    def factors(self, env: Env) -> tuple[tuple[Factor, ...], Fraction]:
         """Independent factors, and the cost that is certain.
 
         What is certain joins the outcomes of a single factor; beside several it is a factor of its
         own with probability 1.
         """
-        part = self._part(block, binding)
+        if not self._items and not self._chances:
+            sets = self._plain_sets(env)
+            if not sets:
+                return (), ZERO
+            # The common case of an action without chance or condition; its pairs are shared.
+            pairs = self._pairs
+            made = tuple([pairs[sets[number]][number] for number in sorted(sets)])
+            return (Factor((Outcome(ONE, (Effect(None, made),)),)),), ZERO
+        part = self.part(env, [])
         cost, part.cost = part.cost, ZERO
         return _arranged(part), cost
 
-    def _part(self, block: Block, binding: Binding) -> _Part:
+    def _plain_sets(self, env: Env) -> dict[int, Truth]:
+        sets: dict[int, Truth] = {}
+        for number_of, value in self._plain:
+            number = number_of(env)
+            # Where one occurrence sets a variable twice, the Kleene maximum wins.
+            if number is not None and sets.get(number, -1) < value:
+                sets[number] = value
+        return sets
+
+    def part(self, env: Env, above: list[Condition]) -> _Part:
+        """What happens in an environment, under the conditions above."""
         part = _Part()
-        for item in block.items:
-            for each in self.atoms.bindings(item.parameters, binding):
-                guard: Condition = TRUE
-                if item.guard is not None:
-                    guard = self.atoms.condition(item.guard, each, strict=True)
-                if guard != FALSE:
-                    self._leaf(part, item.leaf, each, guard)
-        for chance in block.chances:
-            for each in self.atoms.bindings(chance.parameters, binding):
-                factor = self._chance(chance, each)
+        sets = self._plain_sets(env)
+        if sets:
+            part.sets[conjoin(above)] = sets
+        for loop, leaf in self._items:
+            for conditions in loop.guards(env, above):
+                leaf.run(part, env, conjoin(conditions))
+        for chance in self._chances:
+            for factor in chance.factors(env, above):
                 if len(factor.outcomes) > 1:
                     part.factors.append(factor)
                 else:
                     _absorb(part, factor.outcomes[0])
         return part
 
-    def _leaf(self, part: _Part, leaf: me.Set | me.Add, binding: Binding, guard: Condition) -> None:
-        match leaf:
-            case me.Set(predicate, args, value):
-                number = self.atoms.numbers.get(predicate, {}).get(self.atoms.row(args, binding))
-                if number is not None:
-                    _put(part.sets.setdefault(guard, {}), number, value)
-            case me.Add(to, amount, sign, span):
-                if guard != TRUE:
-                    self.report.error(
-                        "BBT0409",
-                        f"a {to} that depends on a condition cannot be grounded",
-                        span,
-                        "write one action for each case",
-                    )
-                elif to == "cost":
-                    part.cost += sign * self.amount(amount, binding)
-                else:
-                    part.reward += sign * self.amount(amount, binding)
-            case _:
-                assert_never(leaf)
 
-    def _chance(self, chance: Chance, binding: Binding) -> Factor:
-        """One draw. A draw nested in a branch as its only one is multiplied in (a sum of outcomes);
-        several, or a mixture of known and unknown probabilities, stay nested."""
-        outcomes: list[Outcome] = []
-        for probability, block in chance.branches:
-            part = self._part(block, binding)
-            if len(part.factors) == 1 and part.factors[0].oneof == chance.oneof:
-                (inner,) = part.factors
-                for outcome in inner.outcomes:
-                    joined = _join(part, outcome)
-                    outcomes.append(_scaled(joined, probability))
+def _number(numbers: dict[Row, int], rows: Callable[[Env], Row]) -> Callable[[Env], int | None]:
+    """The variable of an atom; None for an atom that never changes."""
+    get = numbers.get
+    return lambda env: get(rows(env))
+
+
+@dataclass(frozen=True, slots=True)
+class _Setting:
+    number: Callable[[Env], int | None]
+    value: Truth
+
+    def run(self, part: _Part, env: Env, guard: Condition) -> None:
+        number = self.number(env)
+        if number is not None:
+            _put(part.sets.setdefault(guard, {}), number, self.value)
+
+
+class _Addition:
+    """An increase of cost or reward."""
+
+    def __init__(self, owner: EffectLowering, leaf: me.Add, frame: Frame) -> None:
+        self._report = owner.report
+        self._leaf = leaf
+        self._amount = _Amounts(owner, frame).lower(leaf.amount)
+
+    def run(self, part: _Part, env: Env, guard: Condition) -> None:
+        """Count it where it is certain. A task has no place for one that depends on the state."""
+        leaf = self._leaf
+        if guard is not TRUE:
+            if leaf.to == "cost":
+                hint = "write one action for each case"
+                self._report.error("BBT0409", "a cost under a condition cannot be grounded", leaf.span, hint)
             else:
-                factors = tuple(part.factors)
-                outcomes.append(Outcome(probability, part.effects(), factors, part.reward, part.cost))
-        return _factor(outcomes, chance.oneof)
+                self._report.warning("BBT0409", "a reward under a condition is not counted", leaf.span)
+        elif leaf.to == "cost":
+            part.cost += leaf.sign * self._amount(env)
+        else:
+            part.reward += leaf.sign * self._amount(env)
 
-    def amount(self, amount: me.Amount, binding: Binding) -> Fraction:
-        """The value of a number that no action changes. A missing one is reported and counts 0."""
+
+_Leaf = _Setting | _Addition
+
+
+class _LoweredChance:
+    """A compiled chance."""
+
+    def __init__(self, owner: EffectLowering, chance: Chance, frame: Frame) -> None:
+        self._loop = _Loop(owner.lowering, frame, chance.parameters, chance.guard)
+        self._branches = [(p, LoweredEffect(owner, block, frame)) for p, block in chance.branches]
+        self._oneof = chance.oneof
+
+    def factors(self, env: Env, above: list[Condition]) -> Iterator[Factor]:
+        """One draw for every binding. A draw nested in a branch as its only one is multiplied in (a
+        sum of outcomes); several, or a mixture of known and unknown probabilities, stay nested."""
+        for conditions in self._loop.guards(env, above):
+            outcomes: list[Outcome] = []
+            for probability, branch in self._branches:
+                part = branch.part(env, conditions)
+                if len(part.factors) == 1 and part.factors[0].oneof == self._oneof:
+                    for inner in part.factors[0].outcomes:
+                        joined = _join(part, inner)
+                        outcomes.append(replace(joined, probability=joined.probability * probability))
+                else:
+                    nested = tuple(part.factors)
+                    outcomes.append(Outcome(probability, part.effects(), nested, part.reward, part.cost))
+            yield Factor(merge_outcomes(outcomes), self._oneof)
+
+
+# --- numbers -------------------------------------------------------------------------------------
+
+
+class _Amounts:
+    """Compiles numbers that no action changes. A missing one is reported and counts 0."""
+
+    def __init__(self, owner: EffectLowering, frame: Frame) -> None:
+        self._owner = owner
+        self._frame = frame
+
+    def lower(self, amount: me.Amount) -> Callable[[Env], Fraction]:
+        """The number as a function of the environment."""
         match amount:
             case me.Constant(value):
-                return value
-            case me.FunctionValue(function, args, span):
-                names = tuple(self.atoms.names[index] for index in self.atoms.row(args, binding))
-                found = self.atoms.model.init.numbers.get((function, names))
-                if found is None:
-                    shown = " ".join((function, *names))
-                    self.report.error("BBT0410", f"`:init` gives no value for `({shown})`", span)
-                    return ZERO
-                return found
-            case me.Arithmetic(operator, operands, span):
-                values = [self.amount(operand, binding) for operand in operands]
-                if operator == "/" and ZERO in values[1:]:
-                    self.report.error("BBT0410", "division by zero", span)
-                    return ZERO
-                return _compute(operator, values)
+                return lambda _env: value
+            case me.FunctionValue():
+                return self._value(amount)
+            case me.Arithmetic(operator, operands):
+                lowered = [self.lower(operand) for operand in operands]
+                return lambda env: self._compute(amount, operator, [each(env) for each in lowered])
             case _:
                 assert_never(amount)
 
+    def _value(self, amount: me.FunctionValue) -> Callable[[Env], Fraction]:
+        universe, numbers = self._owner.atoms.universe, self._owner.atoms.model.init.numbers
+        rows = self._frame.rows(amount.args)
 
-def _arranged(part: _Part) -> tuple[Factor, ...]:
-    certain = part.effects()
-    if len(part.factors) == 1:
-        only = part.factors[0]
-        return (_factor([_join(part, outcome) for outcome in only.outcomes], only.oneof),)
-    plain = Outcome(ONE, certain, (), part.reward, part.cost)
-    own = (Factor((plain,)),) if certain or part.reward or part.cost else ()
-    return (*own, *part.factors)
+        def value(env: Env) -> Fraction:
+            args = universe.args(rows(env))
+            found = numbers.get((amount.function, args))
+            if found is None:
+                shown = " ".join((amount.function, *args))
+                self._owner.report.error("BBT0410", f"`:init` gives no value for `({shown})`", amount.span)
+                return ZERO
+            return found
+
+        return value
+
+    def _compute(self, amount: me.Arithmetic, operator: str, values: Sequence[Fraction]) -> Fraction:
+        first, rest = values[0], values[1:]
+        if operator == "-" and not rest:
+            return -first
+        for value in rest:
+            match operator:
+                case "+":
+                    first += value
+                case "-":
+                    first -= value
+                case "*":
+                    first *= value
+                case _ if value:
+                    first /= value
+                case _:
+                    self._owner.report.error("BBT0410", "division by zero", amount.span)
+        return first
 
 
-def arrange(factors: Iterable[Factor]) -> tuple[Factor, ...]:
-    """Factors in canonical form: what is certain joins the outcomes of a single chance, or stands
-    first as a factor of its own; factors that do nothing are gone."""
-    part = _Part()
-    for factor in factors:
-        if len(factor.outcomes) > 1:
-            part.factors.append(factor)
-        else:
-            _absorb(part, factor.outcomes[0])
-    return _arranged(part)
-
-
-def _compute(operator: str, values: Sequence[Fraction]) -> Fraction:
-    first, rest = values[0], values[1:]
-    if operator == "-" and not rest:
-        return -first
-    for value in rest:
-        match operator:
-            case "+":
-                first += value
-            case "-":
-                first -= value
-            case "*":
-                first *= value
-            case _:
-                first /= value
-    return first
+# --- putting together ----------------------------------------------------------------------------
 
 
 def _put(sets: dict[int, Truth], number: int, value: Truth) -> None:
@@ -193,12 +338,27 @@ def _join(part: _Part, outcome: Outcome) -> Outcome:
     return Outcome(outcome.probability, both.effects(), tuple(both.factors), both.reward, both.cost)
 
 
-def _scaled(outcome: Outcome, by: Fraction) -> Outcome:
-    return Outcome(outcome.probability * by, outcome.effects, outcome.factors, outcome.reward, outcome.cost)
+def _arranged(part: _Part) -> tuple[Factor, ...]:
+    if len(part.factors) == 1:
+        only = part.factors[0]
+        if not (part.sets or part.reward or part.cost):
+            return (only,)
+        return (Factor(merge_outcomes(_join(part, outcome) for outcome in only.outcomes), only.oneof),)
+    plain = Outcome(ONE, part.effects(), (), part.reward, part.cost)
+    own = (Factor((plain,)),) if part.sets or part.reward or part.cost else ()
+    return (*own, *part.factors)
 
 
-def _factor(outcomes: Iterable[Outcome], oneof: bool) -> Factor:
-    return Factor(merge_outcomes(outcomes), oneof)
+def arrange(factors: Iterable[Factor]) -> tuple[Factor, ...]:
+    """Factors in canonical form: what is certain joins the outcomes of a single chance, or stands
+    first as a factor of its own; factors that do nothing are gone."""
+    part = _Part()
+    for factor in factors:
+        if len(factor.outcomes) > 1:
+            part.factors.append(factor)
+        else:
+            _absorb(part, factor.outcomes[0])
+    return _arranged(part)
 
 
 def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:

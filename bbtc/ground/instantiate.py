@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 from typing_extensions import assert_never
 
-from bbtc.diagnostics import Diagnostic, Report, Severity
+from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
-from bbtc.ground.atoms import Atoms, Binding
+from bbtc.ground.atoms import Atoms
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
-from bbtc.ground.datalog import Row
-from bbtc.ground.effects import EffectGrounder
-from bbtc.ground.normal import normalise
+from bbtc.ground.effects import EffectLowering, LoweredEffect
+from bbtc.ground.goal import unreachable
+from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
+from bbtc.ground.normal import conjuncts, normalise
 from bbtc.ground.prune import prune
-from bbtc.ground.reach import reach
+from bbtc.ground.reach import Reach, reach
 from bbtc.ground.start import Beginning, beginning
+from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.model import domain as md
-from bbtc.model import effect as me
-from bbtc.model import formula as mf
 
 
 def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
@@ -39,11 +40,13 @@ def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     begin = beginning(model, report, limits)
     report.raise_errors()
     reached = reach(model, begin, limits)
-    builder = _TaskBuilder(model, Atoms(model, reached), report, begin)
+    builder = _TaskBuilder(model, reached, report, begin)
     goal = builder.goal()
     report.raise_errors()
-    actions = builder.actions(reached.actions)
-    templates = builder.templates(reached.templates)
+    actions = builder.actions()
+    templates = builder.templates()
+    limits.check_actions(len(actions) + len(templates))
+    limits.check_time("grounding")
     initial = builder.initial()
     report.raise_errors()
     if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
@@ -98,93 +101,90 @@ def _signatures(model: md.Model) -> tuple[gt.Signature, ...]:
 
 
 class _TaskBuilder:
-    def __init__(self, model: md.Model, atoms: Atoms, report: Report, begin: Beginning) -> None:
+    def __init__(self, model: md.Model, reached: Reach, report: Report, begin: Beginning) -> None:
         self.model = model
-        self.atoms = atoms
+        self.reached = reached
         self.report = report
         self.begin = begin
-        self.effects = EffectGrounder(atoms, report)
-        self._actions: dict[str, gt.GroundAction] = {}
+        self.universe = reached.universe
+        self.atoms = Atoms(reached)
+        self.lowering = Lowering(self.atoms)
+        self.effects = EffectLowering(self.lowering, report)
         self._templates: dict[str, gt.GroundTemplate] = {}
+        self._rows: dict[str, set[Row]] = {}
+        self._makers = {
+            name: _TemplateMaker(self, template) for name, template in self.model.templates.items()
+        }
 
     # --- actions -----------------------------------------------------------------------------
 
-    def actions(self, rows: list[list[Row]]) -> tuple[gt.GroundAction, ...]:
-        """Every action that can ever apply."""
-        for schema, bindings in zip(self.model.schemas.values(), rows, strict=True):
-            block = normalise(schema.effect)
-            names = [parameter.name for parameter in schema.parameters]
-            for row in bindings:
-                binding = dict(zip(names, row, strict=True))
-                precondition = self.atoms.condition(schema.precondition, binding, strict=True)
-                if precondition == FALSE:
-                    continue
-                factors, cost = self.effects.factors(block, binding)
-                action = gt.GroundAction(
-                    schema.name,
-                    self._args(row),
-                    precondition,
-                    factors or (gt.NO_CHANGE,),
-                    cost if self.model.counts_cost else Fraction(1),
-                    schema.span,
-                )
-                self._actions[action.name] = action
-        return tuple(action for _, action in sorted(self._actions.items()))
+    def actions(self) -> tuple[gt.GroundAction, ...]:
+        """Every action that can ever apply, sorted by name."""
+        called = self._called()
+        made: dict[str, list[gt.GroundAction]] = {}
+        for schema, rows in zip(self.model.schemas.values(), self.reached.actions, strict=True):
+            made[schema.name] = self._instances(schema, rows)
+            if schema.name in called:
+                self._rows[schema.name] = {self.universe.row(action.args) for action in made[schema.name]}
+        ordered = (action for name in sorted(made, key=lambda name: f"{name}(") for action in made[name])
+        if self.universe.sorts_like_names:
+            return tuple(ordered)
+        return tuple(sorted(ordered, key=lambda action: action.name))
 
-    def _args(self, row: Row) -> tuple[str, ...]:
-        names = self.atoms.names
-        return tuple([names[index] for index in row])
+    def _instances(self, schema: md.Schema, rows: list[Row]) -> list[gt.GroundAction]:
+        frame = Frame(self.universe, schema.parameters)
+        precondition = self.lowering.condition(schema.precondition, frame, strict=True)
+        effect = self.effects.effect(self.reached.usage.blocks[schema.name], frame)
+        unit, counts_cost = Fraction(1), self.model.counts_cost
+        args, name, span = self.universe.args, schema.name, schema.span
+        made = []
+        for row in rows:
+            env = frame.env(row)
+            condition = precondition(env)
+            if condition is FALSE:
+                continue
+            factors, cost = effect.factors(env)
+            if not counts_cost:
+                cost = unit
+            made.append(gt.GroundAction(name, args(row), condition, factors or _NO_FACTORS, cost, span))
+        return made
+
+    def _called(self) -> set[str]:
+        """Names of the schemas that template bodies call."""
+        bodies = [template.body for template in self.model.templates.values()]
+        found: set[str] = set()
+        while bodies:
+            match bodies.pop():
+                case md.BodyCall("action", name):
+                    found.add(name)
+                case md.BodyControl(_, children):
+                    bodies.extend(children)
+                case md.BodyForeach(_, child):
+                    bodies.append(child)
+                case _:
+                    pass
+        return found
+
+    def is_action(self, name: str, row: Row) -> bool:
+        """Whether an action with these arguments can ever apply."""
+        return row in self._rows[name]
 
     # --- templates ---------------------------------------------------------------------------
 
-    def templates(self, rows: list[list[Row]]) -> tuple[gt.GroundTemplate, ...]:
-        """Every template whose guide can apply, and those they call."""
-        for template, bindings in zip(self.model.templates.values(), rows, strict=True):
-            for row in bindings:
-                self._template(template, row)
+    def templates(self) -> tuple[gt.GroundTemplate, ...]:
+        """Every template whose guide can apply, and those they call, sorted by name."""
+        for name, rows in zip(self.model.templates, self.reached.templates, strict=True):
+            for row in rows:
+                self.template(name, row)
         return tuple(template for _, template in sorted(self._templates.items()))
 
-    def _template(self, template: md.Template, row: Row) -> str:
-        args = self._args(row)
-        name = gt.ground_name(template.name, args)
+    def template(self, template: str, row: Row) -> str:
+        """The name of a ground template, which is made if it is new."""
+        name = gt.ground_name(template, self.universe.args(row))
         if name not in self._templates:
-            binding = dict(zip([p.name for p in template.parameters], row, strict=True))
-            factors: tuple[gt.Factor, ...] = ()
-            if template.effect is not None:
-                factors, _ = self.effects.factors(normalise(template.effect), binding)
-            precondition = self.atoms.condition(template.precondition, binding, strict=True)
             # Templates do not recurse, so the depth is bounded by their number.
-            (body,) = self._body(template.body, binding)
-            self._templates[name] = gt.GroundTemplate(
-                template.name, args, precondition, factors, body, template.span
-            )
+            self._templates[name] = self._makers[template].make(row)
         return name
-
-    def _body(self, body: md.Body, binding: Binding) -> list[gt.Body]:
-        match body:
-            case md.BodyControl(kind, children):
-                made = [each for child in children for each in self._body(child, binding)]
-                return [gt.BodyControl(kind, tuple(made))]
-            case md.BodyCondition(condition):
-                return [gt.BodyCondition(self.atoms.condition(condition, binding))]
-            case md.BodyCall():
-                return [self._call(body, binding)]
-            case md.BodyForeach(parameters, child):
-                every = self.atoms.bindings(parameters, binding)
-                return [each for inner in every for each in self._body(child, inner)]
-            case _:
-                assert_never(body)
-
-    def _call(self, call: md.BodyCall, binding: Binding) -> gt.Body:
-        """A called action that can never apply fails, as its precondition would."""
-        row = self.atoms.row(call.args, binding)
-        if call.kind == "action":
-            name = gt.ground_name(call.name, self._args(row))
-            return gt.BodyAction(name) if name in self._actions else gt.BodyCondition(FALSE)
-        template = self.model.templates[call.name]
-        if any(i not in self.atoms.members(p.types) for i, p in zip(row, template.parameters, strict=True)):
-            return gt.BodyCondition(FALSE)
-        return gt.BodyTemplate(self._template(template, row))
 
     # --- initial states and goal -------------------------------------------------------------
 
@@ -202,48 +202,84 @@ class _TaskBuilder:
         """The goal; an error names each part of it that nothing can ever make true."""
         assert self.model.goal is not None
         parts = []
-        for part in _conjuncts(self.model.goal):
-            if self.atoms.condition(part, {}, strict=True) == FALSE:
-                self._unreachable(part)
+        for part in conjuncts(self.model.goal):
+            if self.lowering.ground(part, strict=True) is FALSE:
+                unreachable(self.model, part, self.report)
             else:
-                parts.append(self.atoms.condition(part, {}))
+                parts.append(self.lowering.ground(part))
         return conjunction(parts)
 
-    def _unreachable(self, part: mf.Formula) -> None:
-        span = part.span or self.model.goal_span
-        shown = " ".join(span.text.split()) if span is not None else "the goal"
-        shown = shown if len(shown) <= 60 else shown[:57] + "..."
-        self.report.add(
-            Diagnostic(
-                "BBT0412",
-                f"the goal cannot be reached: no action ever achieves `{shown}`",
-                span,
-                self._achievers(part),
-                Severity.ERROR,
+
+class _TemplateMaker:
+    """One template, compiled when first asked for."""
+
+    def __init__(self, builder: _TaskBuilder, template: md.Template) -> None:
+        self.builder = builder
+        self.template = template
+        self.frame = Frame(builder.universe, template.parameters)
+        self._compiled: tuple[Lowered, LoweredEffect | None, _Bodies] | None = None
+
+    def make(self, row: Row) -> gt.GroundTemplate:
+        """The ground template for an argument row."""
+        if self._compiled is None:
+            lowering, template = self.builder.lowering, self.template
+            self._compiled = (
+                lowering.condition(template.precondition, self.frame, strict=True),
+                None
+                if template.effect is None
+                else self.builder.effects.effect(normalise(template.effect), self.frame),
+                self._body(template.body),
             )
+        precondition, guide, body = self._compiled
+        env = self.frame.env(row)
+        factors = () if guide is None else guide.factors(env)[0]
+        (root,) = body(env)
+        args = self.builder.universe.args(row)
+        return gt.GroundTemplate(
+            self.template.name, args, precondition(env), factors, root, self.template.span
         )
 
-    def _achievers(self, part: mf.Formula) -> str | None:
-        """What could set the predicate of an unreachable literal, if it is one."""
-        atom = part.part if isinstance(part, mf.Not) else part
-        if not isinstance(atom, mf.Atom):
-            return None
-        value = Truth.FALSE if isinstance(part, mf.Not) else Truth.TRUE
-        setters = [
-            schema.name
-            for schema in self.model.schemas.values()
-            if any(
-                isinstance(leaf, me.Set) and leaf.predicate == atom.predicate and leaf.value is value
-                for leaf in me.leaves(schema.effect)
-            )
-        ]
-        if not setters:
-            return f"no action makes `{atom.predicate}` {value.word}"
-        listed = ", ".join(f"`{name}`" for name in setters[:5])
-        return f"only {listed} could, but never with these objects or never at all: check the preconditions"
+    def _body(self, body: md.Body) -> _Bodies:
+        match body:
+            case md.BodyControl(kind, children):
+                parts = [self._body(child) for child in children]
+                return lambda env: [gt.BodyControl(kind, tuple(each for part in parts for each in part(env)))]
+            case md.BodyCondition(formula):
+                condition = self.builder.lowering.condition(formula, self.frame)
+                return lambda env: [gt.BodyCondition(condition(env))]
+            case md.BodyCall():
+                return self._call(body)
+            case md.BodyForeach(parameters, child):
+                members = self.builder.universe.members
+                loops = [(self.frame.slot(p.name), members(p.types)) for p in parameters]
+                inner = self._body(child)
+                return lambda env: [each for bound in extend(env, loops) for each in inner(bound)]
+            case _:
+                assert_never(body)
+
+    def _call(self, call: md.BodyCall) -> _Bodies:
+        """A called action that can never apply fails, as its precondition would."""
+        builder, name, rows = self.builder, call.name, self.frame.rows(call.args)
+        if call.kind == "action":
+
+            def action(env: Env) -> list[gt.Body]:
+                row = rows(env)
+                if builder.is_action(name, row):
+                    return [gt.BodyAction(gt.ground_name(name, builder.universe.args(row)))]
+                return [gt.BodyCondition(FALSE)]
+
+            return action
+        types = [parameter.types for parameter in builder.model.templates[name].parameters]
+
+        def template(env: Env) -> list[gt.Body]:
+            row = rows(env)
+            # An argument of a type too general may not fit.
+            if all(n in builder.universe.members(t) for n, t in zip(row, types, strict=True)):
+                return [gt.BodyTemplate(builder.template(name, row))]
+            return [gt.BodyCondition(FALSE)]
+
+        return template
 
 
-def _conjuncts(formula: mf.Formula) -> list[mf.Formula]:
-    if isinstance(formula, mf.And):
-        return [each for part in formula.parts for each in _conjuncts(part)]
-    return [formula]
+_Bodies = Callable[[Env], "list[gt.Body]"]
+_NO_FACTORS = (gt.NO_CHANGE,)

@@ -1,33 +1,37 @@
-"""Lifted effects in normal form: single settings with their quantifiers and guard, beside the
-chances they are drawn with. Quantifiers and ``when`` have been pushed inwards."""
+"""Lifted effects and conditions in normal form."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Literal
 
 from typing_extensions import assert_never
 
 from bbtc.model import effect as me
-from bbtc.model.formula import Formula, conjoin
+from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
+
+# --- effects ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """For every binding of ``parameters``: the leaf, where ``guard`` (None: always) is true."""
+    """For every binding of ``parameters``: the leaf, where all of ``guard`` is true."""
 
     parameters: tuple[Parameter, ...]
-    guard: Formula | None
+    guard: tuple[mf.Formula, ...]
     leaf: me.Set | me.Add
 
 
 @dataclass(frozen=True, slots=True)
 class Chance:
-    """For every binding of ``parameters``, independently: one of the branches. Probabilities are
-    positive and sum to 1."""
+    """For every binding of ``parameters``, independently: one of the branches, which changes
+    something only where all of ``guard`` is true. Probabilities are positive and sum to 1."""
 
     parameters: tuple[Parameter, ...]
+    guard: tuple[mf.Formula, ...]
     branches: tuple[tuple[Fraction, Block], ...]
     oneof: bool
 
@@ -41,30 +45,123 @@ class Block:
 
 
 def normalise(effect: me.Effect) -> Block:
-    """The normal form. Branches of probability 0 are gone, and a chance of one branch is no chance."""
-    return _walk(effect, (), None)
+    """The effect as single settings with their quantifiers and guard, beside the chances they are
+    drawn with. Branches of probability 0 are gone, and a chance of one branch is no chance."""
+    items: list[Item] = []
+    chances: list[Chance] = []
+    _walk(effect, (), (), items, chances)
+    return Block(tuple(items), tuple(chances))
 
 
-def _walk(effect: me.Effect, parameters: tuple[Parameter, ...], guard: Formula | None) -> Block:
+def _walk(
+    effect: me.Effect,
+    parameters: tuple[Parameter, ...],
+    guard: tuple[mf.Formula, ...],
+    items: list[Item],
+    chances: list[Chance],
+) -> None:
     match effect:
         case me.Set() | me.Add():
-            return Block((Item(parameters, guard, effect),))
+            items.append(Item(parameters, guard, effect))
         case me.Together(parts):
-            blocks = [_walk(part, parameters, guard) for part in parts]
-            return Block(
-                tuple(item for block in blocks for item in block.items),
-                tuple(chance for block in blocks for chance in block.chances),
-            )
+            for part in parts:
+                _walk(part, parameters, guard, items, chances)
         case me.When(condition, inner):
-            return _walk(inner, parameters, conjoin(guard, condition))
+            _walk(inner, parameters, (*guard, *conjuncts(normal_form(condition))), items, chances)
         case me.ForEach(more, inner):
-            return _walk(inner, parameters + more, guard)
+            _walk(inner, parameters + more, guard, items, chances)
         case me.Choice(branches, oneof):
             possible = [branch for branch in branches if branch.probability > 0]
             if len(possible) == 1:
-                return _walk(possible[0].effect, parameters, guard)
-            # The quantifiers stay outside: every binding is a draw of its own.
-            drawn = tuple((branch.probability, _walk(branch.effect, (), guard)) for branch in possible)
-            return Block((), (Chance(parameters, drawn, oneof),))
+                _walk(possible[0].effect, parameters, guard, items, chances)
+            elif possible:
+                drawn = tuple((branch.probability, normalise(branch.effect)) for branch in possible)
+                chances.append(Chance(parameters, guard, drawn, oneof))
         case _:
             assert_never(effect)
+
+
+# --- conditions ------------------------------------------------------------------------------
+
+
+def normal_form(formula: mf.Formula, negative: bool = False) -> mf.Formula:
+    """Negation normal form: negations stand at atoms and equalities only; quantifiers bind one
+    parameter each, and what does not depend on it stands outside (exact in Kleene logic, a
+    distributive lattice)."""
+    match formula:
+        case mf.Atom() | mf.Equal():
+            return mf.Not(formula) if negative else formula
+        case mf.Test(kind, atom, span):
+            other: Literal["unknown", "known"] = "known" if kind == "unknown" else "unknown"
+            return mf.Test(other, atom, span) if negative else formula
+        case mf.Not(part):
+            return normal_form(part, not negative)
+        case mf.And(parts, span):
+            each = tuple(normal_form(part, negative) for part in parts)
+            return mf.Or(each, span) if negative else mf.And(each, span)
+        case mf.Or(parts, span):
+            each = tuple(normal_form(part, negative) for part in parts)
+            return mf.And(each, span) if negative else mf.Or(each, span)
+        case mf.Quantified(kind, parameters, part, span):
+            inner = normal_form(part, negative)
+            universal = (kind == "forall") is not negative
+            for parameter in reversed(parameters):
+                inner = _bind("forall" if universal else "exists", parameter, inner)
+            return inner
+        case _:
+            assert_never(formula)
+
+
+def _bind(kind: Literal["exists", "forall"], parameter: Parameter, part: mf.Formula) -> mf.Formula:
+    join = mf.And if kind == "exists" else mf.Or
+    parts = list(_flat(join, part))
+    outside = [each for each in parts if parameter.name not in free(each)]
+    inside = [each for each in parts if parameter.name in free(each)]
+    bound = mf.Quantified(kind, (parameter,), inside[0] if len(inside) == 1 else join(tuple(inside)))
+    return join((*outside, bound)) if outside else bound
+
+
+def _flat(join: type[mf.And] | type[mf.Or], formula: mf.Formula) -> Iterator[mf.Formula]:
+    if isinstance(formula, join):
+        for part in formula.parts:
+            yield from _flat(join, part)
+    else:
+        yield formula
+
+
+def conjuncts(formula: mf.Formula) -> Iterator[mf.Formula]:
+    """The parts of nested conjunctions, from left to right."""
+    return _flat(mf.And, formula)
+
+
+def disjuncts(formula: mf.Formula) -> Iterator[mf.Formula]:
+    """The parts of nested disjunctions, from left to right."""
+    return _flat(mf.Or, formula)
+
+
+def free(formula: mf.Formula) -> dict[str, None]:
+    """Free parameters, in order of appearance."""
+    found: dict[str, None] = {}
+    _free(formula, frozenset(), found)
+    return found
+
+
+def _free(formula: mf.Formula, bound: frozenset[str], found: dict[str, None]) -> None:
+    match formula:
+        case mf.Atom(_, args) | mf.Test(_, mf.Atom(_, args)):
+            terms = args
+        case mf.Equal(left, right):
+            terms = (left, right)
+        case mf.Not(part):
+            _free(part, bound, found)
+            return
+        case mf.And(parts) | mf.Or(parts):
+            for part in parts:
+                _free(part, bound, found)
+            return
+        case mf.Quantified(_, parameters, part):
+            _free(part, bound | {p.name for p in parameters}, found)
+            return
+        case _:
+            assert_never(formula)
+    found.update((term, None) for term in terms if mf.is_parameter(term) and term not in bound)

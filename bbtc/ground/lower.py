@@ -1,0 +1,340 @@
+"""Lifted conditions made ground: each is compiled once into a function of the argument row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from operator import itemgetter
+from typing import Any
+
+from typing_extensions import assert_never
+
+from bbtc.diagnostics import BbtcError
+from bbtc.ground.atoms import Atoms
+from bbtc.ground.condition import (
+    FALSE,
+    TRUE,
+    And,
+    Condition,
+    Is,
+    Or,
+    conjunction,
+    disjunction,
+    negation,
+)
+from bbtc.ground.normal import conjuncts, disjuncts, normal_form
+from bbtc.ground.universe import Row, Universe
+from bbtc.kleene import Truth
+from bbtc.model import domain as md
+from bbtc.model import formula as mf
+from bbtc.model.types import Parameter
+
+Env = list[int]
+"""Numbers of objects: arguments first, then constants and the current values of quantifiers."""
+Lowered = Callable[[Env], Condition]
+
+_MOST_UNFOLDINGS = 100_000
+_DEEPEST_UNFOLDING = 80
+
+
+class Frame:
+    """Where each term of one lifted thing stands in its environment. A name always has the same
+    place: parameters in scope never share a name."""
+
+    def __init__(self, universe: Universe, parameters: Iterable[Parameter]) -> None:
+        self.universe = universe
+        self._slots = {parameter.name: slot for slot, parameter in enumerate(parameters)}
+        self._tail: list[int] = []
+
+    def slot(self, term: mf.Term) -> int:
+        """The place of a term; a new one for an object or a quantifier's parameter."""
+        if term not in self._slots:
+            self._slots[term] = len(self._slots)
+            self._tail.append(-1 if mf.is_parameter(term) else self.universe.index[term])
+        return self._slots[term]
+
+    def env(self, row: Iterable[int]) -> Env:
+        """The environment for an argument row (ask once everything is compiled)."""
+        return [*row, *self._tail]
+
+    def rows(self, args: tuple[mf.Term, ...]) -> Callable[[Env], Row]:
+        """Reads the arguments of an atom from an environment."""
+        slots = [self.slot(arg) for arg in args]
+        if not slots:
+            return lambda _env: ()
+        if len(slots) == 1:
+            only = slots[0]
+            return lambda env: (env[only],)
+        getter: Any = itemgetter(*slots)
+        return getter  # type: ignore[no-any-return]
+
+
+class Lowering:
+    """Compiles the conditions of one model."""
+
+    def __init__(self, atoms: Atoms) -> None:
+        self.atoms = atoms
+        self.universe = atoms.universe
+        self._derived = _Derived(self)
+
+    def condition(self, formula: mf.Formula, frame: Frame, *, strict: bool = False) -> Lowered:
+        """``strict``: only whether the condition is true matters, not whether false or unknown."""
+        return self.normal(normal_form(formula), frame, strict=strict)
+
+    def ground(self, formula: mf.Formula, *, strict: bool = False) -> Condition:
+        """A condition without free parameters."""
+        frame = Frame(self.universe, ())
+        return self.condition(formula, frame, strict=strict)(frame.env(()))
+
+    def normal(self, formula: mf.Formula, frame: Frame, *, strict: bool) -> Lowered:
+        """:meth:`condition` of a formula in normal form."""
+        match formula:
+            case mf.Atom(predicate, args):
+                return self._literal(predicate, args, Truth.TRUE, frame, strict)
+            case mf.Not(mf.Atom(predicate, args)):
+                return self._literal(predicate, args, Truth.FALSE, frame, strict)
+            case mf.Test(kind, atom):
+                value = Truth.UNKNOWN if kind == "unknown" else None
+                return self._literal(atom.predicate, atom.args, value, frame, strict)
+            case mf.Equal(left, right):
+                return _equal(frame.slot(left), frame.slot(right), TRUE, FALSE)
+            case mf.Not(mf.Equal(left, right)):
+                return _equal(frame.slot(left), frame.slot(right), FALSE, TRUE)
+            case mf.And():
+                parts = sorted(conjuncts(formula), key=self._late)
+                return _all([self.normal(part, frame, strict=strict) for part in parts])
+            case mf.Or():
+                parts = sorted(disjuncts(formula), key=self._late)
+                return _any([self.normal(part, frame, strict=strict) for part in parts])
+            case mf.Quantified(kind, (parameter,), inner):
+                slot, members = frame.slot(parameter.name), self.universe.members(parameter.types)
+                lowered = self.normal(inner, frame, strict=strict)
+                return (_for_all if kind == "forall" else _for_some)(slot, members, lowered)
+            case mf.Not() | mf.Quantified():
+                raise AssertionError("not in normal form")
+            case _:
+                assert_never(formula)
+
+    def _late(self, part: mf.Formula) -> int:
+        """Constant parts first: they often settle the whole without a look at the rest. Parts that
+        are not constant keep their order."""
+        match part:
+            case mf.Equal() | mf.Not(mf.Equal()):
+                return 0
+            case mf.Atom(predicate) | mf.Not(mf.Atom(predicate)):
+                return 1 if self.atoms.reach.usage.is_static(predicate) else 2
+            case _:
+                return 2
+
+    def _literal(
+        self, predicate: str, args: tuple[mf.Term, ...], value: Truth | None, frame: Frame, strict: bool
+    ) -> Lowered:
+        rows = frame.rows(args)
+        if predicate in self.atoms.reach.usage.derived:
+            return self._derived.literal(predicate, rows, value)
+        leaves, other = self.atoms.leaves(predicate, value, strict=strict)
+        get = leaves.get
+        return lambda env: get(rows(env), other)
+
+
+# --- combinations ----------------------------------------------------------------------------
+
+
+def _equal(left: int, right: int, same: Condition, different: Condition) -> Lowered:
+    return lambda env: same if env[left] == env[right] else different
+
+
+def _all(parts: list[Lowered]) -> Lowered:
+    if len(parts) == 1:
+        return parts[0]
+
+    def run(env: Env) -> Condition:
+        found = []
+        for part in parts:
+            condition = part(env)
+            if condition is FALSE:
+                return FALSE
+            if condition is not TRUE:
+                found.append(condition)
+        return conjoin(found)
+
+    return run
+
+
+def _any(parts: list[Lowered]) -> Lowered:
+    if len(parts) == 1:
+        return parts[0]
+
+    def run(env: Env) -> Condition:
+        found = []
+        for part in parts:
+            condition = part(env)
+            if condition is TRUE:
+                return TRUE
+            if condition is not FALSE:
+                found.append(condition)
+        return disjunction(found)
+
+    return run
+
+
+def _for_all(slot: int, members: tuple[int, ...], inner: Lowered) -> Lowered:
+    def run(env: Env) -> Condition:
+        found = []
+        for env[slot] in members:
+            condition = inner(env)
+            if condition is FALSE:
+                return FALSE
+            if condition is not TRUE:
+                found.append(condition)
+        return conjoin(found)
+
+    return run
+
+
+def _for_some(slot: int, members: tuple[int, ...], inner: Lowered) -> Lowered:
+    def run(env: Env) -> Condition:
+        found = []
+        for env[slot] in members:
+            condition = inner(env)
+            if condition is TRUE:
+                return TRUE
+            if condition is not FALSE:
+                found.append(condition)
+        return disjunction(found)
+
+    return run
+
+
+def conjoin(parts: list[Condition]) -> Condition:
+    """:func:`bbtc.ground.condition.conjunction` of parts that are no constants; leaves, which are
+    shared, are told apart by identity, which is faster."""
+    if not parts:
+        return TRUE
+    if len(parts) == 1:
+        return parts[0]
+    for part in parts:
+        if type(part) is not Is:
+            return conjunction(parts)
+    unique = {id(part): part for part in parts}
+    return And(tuple(unique.values())) if len(unique) > 1 else parts[0]
+
+
+# --- derived predicates ----------------------------------------------------------------------
+
+
+class _Derived:
+    """Replaces derived atoms by the condition they stand for.
+
+    An atom within its own unfolding counts as false: in the least fixpoint, a proof that uses an
+    atom to prove itself is never needed. Results are kept where no such cut was made.
+    """
+
+    def __init__(self, lowering: Lowering) -> None:
+        self._lowering = lowering
+        self._reach = lowering.atoms.reach
+        self._rules: dict[str, list[tuple[md.Rule, Frame, list[int], Lowered]]] = {}
+        self._known: dict[tuple[str, Row], Condition] = {}
+        self._depth: dict[tuple[str, Row], int] = {}
+        self._lowest = _DEEPEST_UNFOLDING
+        self._count = 0
+
+    def literal(self, predicate: str, rows: Callable[[Env], Row], value: Truth | None) -> Lowered:
+        """The condition that a derived atom is true, false, unknown or (None) known."""
+        if value is Truth.TRUE:
+            return lambda env: self._unfold(predicate, rows(env))
+        if value is Truth.FALSE:
+            return lambda env: negation(self._unfold(predicate, rows(env)))
+        return lambda env: self._test(predicate, rows(env), value)
+
+    def _unfold(self, predicate: str, row: Row) -> Condition:
+        key = (predicate, row)
+        if row not in self._reach.values[Truth.TRUE][predicate]:
+            if row not in self._reach.values[Truth.UNKNOWN][predicate]:
+                return FALSE
+        elif predicate in self._reach.usage.unchanging:
+            return TRUE
+        if key in self._known:
+            return self._known[key]
+        if key in self._depth:
+            self._lowest = min(self._lowest, self._depth[key])
+            return FALSE
+        self._count += 1
+        depth = len(self._depth)
+        if self._count > _MOST_UNFOLDINGS or depth >= _DEEPEST_UNFOLDING:
+            raise BbtcError.single(
+                "BBT0408",
+                f"the derived predicate `{predicate}` is too deeply recursive to be unfolded",
+                next(rule.span for rule in self._reach.usage.model.rules if rule.predicate == predicate),
+            )
+        above, self._lowest = self._lowest, _DEEPEST_UNFOLDING
+        self._depth[key] = depth
+        result = disjunction(self._instances(predicate, row))
+        del self._depth[key]
+        if self._lowest >= depth:
+            self._known[key] = result
+            self._lowest = above
+        else:
+            self._lowest = min(above, self._lowest)
+        return result
+
+    def _instances(self, predicate: str, row: Row) -> Iterator[Condition]:
+        if predicate not in self._rules:
+            self._rules[predicate] = list(self._compile(predicate))
+        members = self._lowering.universe.members
+        for rule, frame, head, condition in self._rules[predicate]:
+            env = frame.env([-1] * len(rule.parameters))
+            slots = dict(enumerate(rule.parameters))
+            if all(self._bind(env, slot, number, slots) for slot, number in zip(head, row, strict=True)):
+                unbound = [(slot, members(p.types)) for slot, p in slots.items() if env[slot] < 0]
+                for bound in extend(env, unbound):
+                    yield condition(bound)
+
+    def _bind(self, env: Env, slot: int, number: int, slots: dict[int, Parameter]) -> bool:
+        if env[slot] < 0 and number not in self._lowering.universe.members(slots[slot].types):
+            return False
+        if env[slot] < 0:
+            env[slot] = number
+        return env[slot] == number
+
+    def _compile(self, predicate: str) -> Iterator[tuple[md.Rule, Frame, list[int], Lowered]]:
+        for rule in self._reach.usage.model.rules:
+            if rule.predicate == predicate:
+                frame = Frame(self._lowering.universe, rule.parameters)
+                head = [frame.slot(arg) for arg in rule.args]
+                yield rule, frame, head, self._lowering.condition(rule.condition, frame)
+
+    def _test(self, predicate: str, row: Row, value: Truth | None) -> Condition:
+        """``(unknown p)`` or ``(known p)`` of a derived atom."""
+        unknown = self._unknown(self._unfold(predicate, row))
+        return negation(unknown) if value is None else unknown
+
+    def _unknown(self, condition: Condition) -> Condition:
+        """When a Kleene condition is unknown: it may be true (no part settles it), yet is not."""
+        match condition:
+            case Is(variable, value) if value is not Truth.UNKNOWN:
+                predicate, row = self._lowering.atoms.keys[variable]
+                leaves, other = self._lowering.atoms.leaves(predicate, Truth.UNKNOWN, strict=True)
+                return leaves.get(row, other)
+            case And(parts):
+                some = disjunction(map(self._unknown, parts))
+                return conjunction([some, *map(self._not_false, parts)])
+            case Or(parts):
+                some = disjunction(map(self._unknown, parts))
+                return conjunction([some, *(self._not_false(negation(part)) for part in parts)])
+            case _:
+                # Constants and tests are never unknown.
+                return FALSE
+
+    def _not_false(self, condition: Condition) -> Condition:
+        """True where the condition is true or unknown, else false or unknown."""
+        return disjunction([condition, self._unknown(condition)])
+
+
+def extend(env: Env, loops: list[tuple[int, tuple[int, ...]]]) -> Iterator[Env]:
+    """The environment with the given slots bound in every way (always the same list)."""
+    if not loops:
+        yield env
+        return
+    slot, members = loops[0]
+    for env[slot] in members:
+        yield from extend(env, loops[1:])

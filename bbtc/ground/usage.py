@@ -1,0 +1,101 @@
+"""How the predicates of a model are used: which change, which can be unknown, which are derived."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from bbtc.ground.normal import Block, Item, normalise
+from bbtc.ground.universe import Row
+from bbtc.kleene import Truth
+from bbtc.model import domain as md
+from bbtc.model import effect as me
+from bbtc.model import formula as mf
+from bbtc.model.types import Parameter
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """What can hold at the start: atoms that can be true, that can be unknown, and that are false
+    in no initial state."""
+
+    true: dict[str, list[Row]]
+    unknown: dict[str, list[Row]]
+    never_false: dict[str, list[Row]]
+
+
+class Usage:
+    """Facts about the predicates of a model with its initial states, for the stages of grounding."""
+
+    def __init__(self, model: md.Model, start: Start) -> None:
+        self.model = model
+        self.start = start
+        self.blocks = {name: normalise(schema.effect) for name, schema in model.schemas.items()}
+        self.set_values: dict[str, set[Truth]] = {}
+        for block in self.blocks.values():
+            for item, _ in items(block, ()):
+                if isinstance(item.leaf, me.Set):
+                    self.set_values.setdefault(item.leaf.predicate, set()).add(item.leaf.value)
+        self.derived = {rule.predicate for rule in model.rules}
+        self.unchanging = self._unchanging()
+        self.loose = self._loose()
+
+    def is_static(self, predicate: str) -> bool:
+        """Whether no action changes the predicate; true of derived ones, too, where nothing they
+        read changes or is unknown."""
+        if predicate in self.derived:
+            return predicate in self.unchanging
+        return predicate not in self.set_values
+
+    def can_be_unknown(self, predicate: str) -> bool:
+        """Whether some atom of the predicate may be unknown at some time."""
+        if predicate in self.derived:
+            return predicate not in self.unchanging and self.model.predicates[predicate].three_valued
+        return Truth.UNKNOWN in self.set_values.get(predicate, ()) or bool(self.start.unknown.get(predicate))
+
+    def _unchanging(self) -> set[str]:
+        """Derived predicates that only read, all the way down, what never changes nor is unknown."""
+        found = set(self.derived)
+        shrunk = True
+        while shrunk:
+            shrunk = False
+            for rule in self.model.rules:
+                if rule.predicate in found and not all(
+                    atom.predicate in found
+                    if atom.predicate in self.derived
+                    else self.is_static(atom.predicate) and not self.start.unknown.get(atom.predicate)
+                    for atom in mf.atoms(rule.condition)
+                ):
+                    found.discard(rule.predicate)
+                    shrunk = True
+        return found
+
+    def _loose(self) -> set[tuple[str, int]]:
+        """Argument positions that may hold objects outside their declared type, because an effect
+        or a rule sets them through a parameter of a more general type."""
+        loose: set[tuple[str, int]] = set()
+        types = self.model.types
+
+        def look(predicate: str, args: tuple[mf.Term, ...], around: tuple[Parameter, ...]) -> None:
+            scope = {parameter.name: parameter for parameter in around}
+            declared = self.model.predicates[predicate].parameters
+            for position, (arg, parameter) in enumerate(zip(args, declared, strict=True)):
+                if arg in scope and not types.fits(scope[arg].types, parameter.types):
+                    loose.add((predicate, position))
+
+        for name, schema in self.model.schemas.items():
+            for item, around in items(self.blocks[name], schema.parameters):
+                if isinstance(item.leaf, me.Set):
+                    look(item.leaf.predicate, item.leaf.args, around)
+        for rule in self.model.rules:
+            look(rule.predicate, rule.args, rule.parameters)
+        return loose
+
+
+def items(block: Block, around: tuple[Parameter, ...]) -> Iterator[tuple[Item, tuple[Parameter, ...]]]:
+    """Every item of a block, those of its chances included, with all parameters in scope."""
+    for item in block.items:
+        yield item, around + item.parameters
+    for chance in block.chances:
+        for _, branch in chance.branches:
+            yield from items(branch, around + chance.parameters)
