@@ -178,7 +178,7 @@ class _Writer:
         condition = guard_of(self.task, node)
         guard = None
         if condition is not None:
-            guard = self.conditions.write(normal(self.task, condition), binding)
+            guard = self.conditions.write(condition, binding)
         suffix = ("Once" if node.latched else "Again") + ("WhenReady" if guard is not None else "")
         key = (suffix, tostring(tag), None if guard is None else tostring(guard))
         if key not in self.action_trees:

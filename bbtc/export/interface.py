@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from bbtc.export.names import Symbol, parameter_names
-from bbtc.ground.condition import Condition, variables
+from bbtc.export.shape import normal
+from bbtc.ground.condition import TRUE, Condition, variables
 from bbtc.ground.task import GroundAction, Task, Variable
 from bbtc.tree.nodes import ActionNode, ConditionNode, Node, walk
 
@@ -47,8 +48,11 @@ def action_symbol(action: GroundAction) -> Symbol:
 
 
 def guard_of(task: Task, node: ActionNode) -> Condition | None:
-    """What must be true for the node to start its action, if it is guarded."""
-    return task.action_by_name[node.action].precondition if node.guarded else None
+    """What must be true for the node to start its action, in normal form; None if nothing."""
+    if not node.guarded:
+        return None
+    guard = normal(task, task.action_by_name[node.action].precondition)
+    return None if guard == TRUE else guard
 
 
 def interface_of(task: Task, root: Node) -> Interface:
@@ -57,7 +61,7 @@ def interface_of(task: Task, root: Node) -> Interface:
     actions: dict[Symbol, None] = {}
     for node in walk(root):
         if isinstance(node, ConditionNode):
-            read.update(dict.fromkeys(variables(node.condition)))
+            read.update(dict.fromkeys(variables(normal(task, node.condition))))
         elif isinstance(node, ActionNode):
             actions[action_symbol(task.action_by_name[node.action])] = None
             guard = guard_of(task, node)

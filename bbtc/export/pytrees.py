@@ -153,7 +153,7 @@ class _Writer:
         items: list[Code] = [name, _thunk(call(method, *map(literal, action.args))), "robot.cancel"]
         guard = guard_of(self.task, node)
         if guard is not None:
-            items.append(Prefixed("guard=", self._test(normal(self.task, guard))))
+            items.append(Prefixed("guard=", self._test(guard)))
         if not node.latched:
             items.append("keep=False")
         return call("Latch", *items)

@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
-from bbtc.export.interface import Interface, Leaf
+from bbtc.export.interface import Interface, Leaf, guard_of
 from bbtc.export.names import Symbol
 from bbtc.export.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
 from bbtc.export.pytrees_parts import ConditionCode, method_parameters
 from bbtc.export.shape import normal
-from bbtc.ground.condition import variables
+from bbtc.ground.condition import TRUE, variables
 from bbtc.ground.task import Factor, GroundAction, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, actions_of, walk
@@ -113,9 +113,9 @@ def _relevant(tree: Tree, actions: list[GroundAction]) -> set[int]:
     found: set[int] = set()
     for node in walk(tree.root):
         if isinstance(node, ConditionNode):
-            found.update(variables(node.condition))
-        elif isinstance(node, ActionNode) and node.guarded:
-            found.update(variables(task.action_by_name[node.action].precondition))
+            found.update(variables(normal(task, node.condition)))
+        elif isinstance(node, ActionNode):
+            found.update(variables(guard_of(task, node) or TRUE))
     stack = [factor for action in actions for factor in action.factors]
     while stack:
         for outcome in stack.pop().outcomes:
@@ -123,7 +123,7 @@ def _relevant(tree: Tree, actions: list[GroundAction]) -> set[int]:
             for effect in outcome.effects:
                 found.update(index for index, _ in effect.sets)
                 if effect.when is not None:
-                    found.update(variables(effect.when))
+                    found.update(variables(normal(task, effect.when)))
     return found
 
 
