@@ -163,6 +163,8 @@ class Builder:
 
     def type_either(self, children: list[Any]) -> tuple[tuple[ast.Term, ...], Span]:
         dash, _, *runs, close = children
+        if not runs:
+            raise Misuse("BBT0101", "`(either)` names no type", between(dash, close))
         return tuple(t for run in runs for t in leaves.terms(run.text, run.start, SOURCE.get())), between(
             dash, close
         )

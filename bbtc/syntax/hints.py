@@ -32,6 +32,7 @@ _MARK = re.compile(r"\(\s*([^\s()?]*)|\)|(?<![^\s()]):[a-z-]+", re.IGNORECASE | 
 _FOUND = re.compile(r"\(\s*[^\s()]*|\)|[^\s()]+")
 _KEYWORD = re.compile(r"(?:\\\(\\s\*)?(:?)(?:\(([a-z|-]+)\)|([a-z-]+))(?:\(\?=|\\s\*)")
 _TERM = re.compile(r"\s*\??[a-z0-9_][a-z0-9_.*+@#$%!~-]*", re.IGNORECASE)
+_ATOM_HEAD = re.compile(r"\(\s*([a-z0-9_][^\s()?]*)[^()]*\(", re.IGNORECASE)
 _NAME = re.compile(r"[a-z0-9_]", re.IGNORECASE)
 
 # What may stand at a place, by the first terminal of the list that may.
@@ -55,16 +56,16 @@ _SLOTS: tuple[tuple[str, str], ...] = (
     ("OPEN", "`(`"),
 )
 _FIELDS = {
-    "EFFECT": ":effect",
     "PARAMETERS": ":parameters",
     "VARS": ":vars",
     "PRECONDITION": ":precondition",
-    "OBSERVE": ":observe",
-    "BODY": ":body",
     "CONDITION_FIELD": ":condition",
+    "OBSERVE": ":observe",
     "SENSED": ":sensed",
     "CONTEXT": ":context",
     "IMPLIES": ":implies",
+    "EFFECT": ":effect",
+    "BODY": ":body",
 }
 _NOT_IN_CONDITION = {
     "when": "`when` stands in effects only",
@@ -174,10 +175,16 @@ def _unheaded(place: Place) -> Fault | None:
 
 def _misspelt(place: Place, forms: list[Form]) -> Fault | None:
     """A form whose first word is not quite a keyword."""
-    if "NESTED" not in place.accepted or not forms or forms[-1].word in CONNECTIVES:
+    if "SEQUENCE" in place.accepted:
+        body = _ATOM_HEAD.match(place.text, place.position)
+        start, word, field = (place.position, body[1], "") if body else (0, "", "")
+        known = {keyword for kind in place.accepted for keyword in place.words.get(kind, ())}
+    elif "NESTED" in place.accepted and forms:
+        start, word, field = forms[-1]
+        known = set(CONNECTIVES)
+    else:
         return None
-    start, word, field = forms[-1]
-    near = None if field or word.startswith(":") else nearest(word, CONNECTIVES)
+    near = None if field or word in known or word.startswith(":") else nearest(word, known)
     if near is None:
         return None
     return Fault(
@@ -226,7 +233,7 @@ def _where(forms: list[Form]) -> str:
     """The form in which something is expected, in words."""
     if not forms:
         return ""
-    inner = forms[-1]
+    inner = forms[-1] if forms[-1].word or len(forms) == 1 else forms[-2]
     if inner.field:
         return f" after `{inner.field}`"
     return f" in `({inner.word}`" if inner.word else ""
@@ -245,6 +252,8 @@ def _misplaced(place: Place, word: str) -> str | None:
     """Why a keyword that has its place elsewhere cannot stand here."""
     if "WHEN" in place.accepted:
         return _NOT_IN_EFFECT.get(word)
+    if "SEQUENCE" in place.accepted and word in CONNECTIVES:
+        return "a condition in a tree is `(condition …)`"
     return _NOT_IN_CONDITION.get(word) if "IMPLY" in place.accepted else None
 
 
@@ -252,6 +261,10 @@ def _joined(place: Place, found: str, forms: list[Form]) -> str | None:
     """Advice where one part is given too many, or a parameter lacks its question mark."""
     if "VARIABLES" in place.accepted and _NAME.match(found):
         return f"parameters start with `?`: `?{found}`"
+    if "HEAD" in place.accepted and _NAME.match(found):
+        return f"write `({found})`"
+    if "KEY" in place.accepted and _NAME.match(found):
+        return f"write `:{found}`"
     after_form = found.startswith("(") and place.text[: place.position].rstrip().endswith(")")
     if not (after_form and forms and "CLOSE" in place.accepted):
         return None

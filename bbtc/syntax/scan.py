@@ -64,8 +64,8 @@ def foreign_characters(text: str) -> tuple[list[Fault], str]:
     underscore for each of these."""
     faults = []
     for match in _FOREIGN.finditer(text):
-        shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in match.group()[:10])
-        what = f"characters `{shown}`" if len(match.group()) > 1 else f"character `{shown}`"
+        shown = repr(match.group()[:10])
+        what = f"characters {shown}" if len(match.group()) > 1 else f"character {shown}"
         hint = "names hold letters, digits and _ - . * + @ # $ % ! ~"
         faults.append(Fault("BBT0104", f"{what} cannot stand here", *match.span(), hint))
     return faults, _FOREIGN.sub(lambda match: "_" * len(match.group()), text) if faults else text

@@ -1,0 +1,6 @@
+(define (domain)
+  (:predicates (lit ?r)))
+(define (problm evening)
+  (:goal (lit hall)))
+(defne (problem night)
+  (:goal (lit hall)))

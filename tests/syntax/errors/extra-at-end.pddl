@@ -1,0 +1,4 @@
+(define (domain house)
+  (:predicates (lit ?r))
+  (:action wait
+    :effect (lit hall))))

@@ -1,0 +1,5 @@
+(define (domain house)
+  (:predicates (lit ?r))
+  (:action look
+    :effect (lit hall)
+    :effect (lit attic)))

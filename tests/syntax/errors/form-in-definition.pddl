@@ -1,0 +1,6 @@
+(define (domain house)
+  (:predicates (lit ?r))
+(and
+  (:action wait
+    :effect (lit hall))
+)

@@ -1,0 +1,5 @@
+(define (problem evening)
+  (:domain house)
+  (:goal-probability high)
+  (:metric minimise (total-cost))
+  (:goal (lit hall)))

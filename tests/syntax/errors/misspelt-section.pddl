@@ -1,0 +1,3 @@
+(define (domain house)
+  (:predicats (lit ?r))
+  (:acton look :effect (lit hall)))

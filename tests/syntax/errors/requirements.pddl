@@ -1,0 +1,3 @@
+(define (domain house)
+  (:requirements typing :strips)
+  (:predicates (lit ?r)))

@@ -1,0 +1,4 @@
+(define (domain house)
+  (:predicates (lit ?r)) 07
+  (:action wait
+    :effect (lit hall)))

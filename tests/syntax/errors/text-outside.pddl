@@ -1,0 +1,4 @@
+(define (domain house)
+  (:predicates (lit ?r)))
+(:plan (look hall))
+and so on
