@@ -23,7 +23,7 @@ MAX_DEPTH = 100
 
 def grammar_text() -> str:
     """The grammar of the language: package data in a wheel, ``grammar/bbtc.lark`` in a checkout."""
-    packaged = files("bbtc").joinpath("grammar", "bbtc.lark")
+    packaged = files("bbtc") / "grammar" / "bbtc.lark"
     if packaged.is_file():
         return packaged.read_text("utf-8")
     return (Path(__file__).parents[2] / "grammar" / "bbtc.lark").read_text("utf-8")
