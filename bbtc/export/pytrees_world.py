@@ -11,7 +11,7 @@ from bbtc.export.names import Symbol
 from bbtc.export.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
 from bbtc.export.pytrees_parts import ConditionCode, method_parameters
 from bbtc.export.shape import normal
-from bbtc.ground.condition import TRUE, variables
+from bbtc.ground.condition import FALSE, TRUE, variables
 from bbtc.ground.task import Factor, GroundAction, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, actions_of, walk
@@ -90,14 +90,16 @@ class WorldWriter:
     def _outcome(self, outcome: Outcome) -> Code:
         items: list[Code] = []
         for effect in outcome.effects:
+            when = TRUE if effect.when is None else normal(self._task, effect.when)
+            if when == FALSE or not effect.sets:
+                continue
             # Where one effect sets a variable twice, the Kleene maximum wins, as between effects.
             united: dict[int, Truth] = {}
             for index, value in effect.sets:
                 united[index] = max(value, united.get(index, Truth.FALSE))
             parts: list[Code] = [self._state(united.items())]
-            if effect.when is not None:
-                when = self._conditions.write(normal(self._task, effect.when), self._read)
-                parts.append(Prefixed("when=lambda s: ", when))
+            if when != TRUE:
+                parts.append(Prefixed("when=lambda s: ", self._conditions.write(when, self._read)))
             items.append(call("Effect", *parts))
         if outcome.factors:
             items.append(Prefixed("then=", self._factors(outcome.factors)))

@@ -128,7 +128,7 @@ class Latch(Decorator):
 
 
 class Skipper(Composite):
-    """Goes on to the next child while the child is RUNNING; returns the first SUCCESS or FAILURE."""
+    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
     def tick(self) -> Iterator[Behaviour]:
         status = Status.RUNNING

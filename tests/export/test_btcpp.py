@@ -1,0 +1,234 @@
+"""BehaviorTree.CPP files: their form, whatever the names and however deep the tree."""
+
+from __future__ import annotations
+
+import random
+import re
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from bbtc.diagnostics import BbtcError
+from bbtc.export.btcpp import RESERVED
+from bbtc.export.registry import load_exporter, parse_options
+from bbtc.export.shape import DEEPEST_TREE
+from bbtc.ground.condition import TRUE, And, Condition, Is, Known, Not, Or
+from bbtc.ground.task import GroundAction, InitialState, Task, Variable
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
+from tests.conftest import Golden
+from tests.replay.engines import BtcppReplay
+from tests.replay.random_trees import random_tree
+from tests.replay.reference import random_run, varied_runs
+from tests.replay.script import TIMINGS, Run, Script
+from tests.strategies import HOSTILE_NAMES, soda_tree, trees
+
+
+def export(tree: Tree, **options: str) -> str:
+    exporter = load_exporter("btcpp")
+    text = exporter.export(tree, parse_options(exporter, options), None)
+    assert isinstance(text, str)
+    return text
+
+
+def tree_of(root: Node, *variables: Variable, actions: tuple[GroundAction, ...] = ()) -> Tree:
+    initial = (InitialState(Fraction(1), (Truth.FALSE,) * len(variables)),)
+    return Tree(
+        Task("d", "p", variables, initial, TRUE, actions), root, Fraction(1), Fraction(1), "target-reached"
+    )
+
+
+def check_form(text: str) -> ET.Element:
+    """Fail unless the file keeps every rule of the engine that an XML reader can check."""
+    root = ET.fromstring(text)
+    assert root.attrib["BTCPP_format"] == "4"
+    assert [child.tag for child in root] == ["BehaviorTree"] * (len(root) - 1) + ["TreeNodesModel"]
+    trees_by_id = {tree.attrib["ID"]: tree for tree in root.iter("BehaviorTree")}
+    assert len(trees_by_id) == len(root) - 1
+    assert root.attrib["main_tree_to_execute"] in trees_by_id
+    model = root[-1]
+    entries = {entry.attrib["ID"]: entry for entry in model}
+    assert len(entries) == len(model)
+    ids = [*trees_by_id, *(name for name, entry in entries.items() if entry.tag != "SubTree")]
+    assert len({name.casefold() for name in ids}) == len(ids)
+    assert not {name.casefold() for name in ids} & {name.casefold() for name in RESERVED}
+    for name in ids:
+        assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name)
+    for tree in trees_by_id.values():
+        assert len(tree) == 1
+        check_nodes(tree, entries, set(trees_by_id))
+    return root
+
+
+def check_nodes(tree: ET.Element, entries: dict[str, ET.Element], tree_ids: set[str]) -> None:
+    """Fail unless every node of a BehaviorTree is known, has its ports, and its children."""
+    assert depth(tree) <= 250
+    names = [node.attrib["name"] for node in tree.iter("SubTree") if "name" in node.attrib]
+    assert len(set(names)) == len(names)
+    for node in list(tree.iter())[1:]:
+        own = {key for key in node.attrib if not key.startswith("_") and key not in ("name", "ID")}
+        if node.tag == "SubTree":
+            assert node.attrib["ID"] in tree_ids
+            model = entries.get(node.attrib["ID"])
+            assert own == ({port.attrib["name"] for port in model} if model is not None else set())
+            assert not any(re.match(r"[0-9.+-]", node.attrib[port]) for port in own)
+        elif node.tag in entries:
+            assert own == {port.attrib["name"] for port in entries[node.tag]}
+            assert len(node) == 0
+        else:
+            assert node.tag in RESERVED
+        if node.tag in ("ReactiveSequence", "ReactiveFallback", "Parallel", "Sequence"):
+            assert len(node) >= 1
+        if node.tag in ("Inverter", "ForceSuccess", "ForceFailure", "KeepRunningUntilFailure"):
+            assert len(node) == 1
+
+
+def depth(element: ET.Element) -> int:
+    deepest, stack = 0, [(element, 0)]
+    while stack:
+        node, level = stack.pop()
+        deepest = max(deepest, level)
+        stack.extend((child, level + 1) for child in node)
+    return deepest
+
+
+def test_the_soda_tree(golden: Golden) -> None:
+    text = export(soda_tree())
+    check_form(text)
+    golden("export/soda.xml", text)
+
+
+def test_the_model_can_be_left_out() -> None:
+    assert "TreeNodesModel" not in export(soda_tree(), model="no")
+
+
+def test_stock_nodes_are_those_of_the_engine(shared: Path) -> None:
+    stock = ET.parse(shared / "backends" / "btcpp-builtin-nodes-4.10.0.xml")
+    assert {node.attrib["ID"] for node in stock.getroot()[0]} <= RESERVED
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_random_trees_keep_the_rules_of_the_engine(seed: int) -> None:
+    tree = random_tree(seed, latched=0.7)
+    text = export(tree)
+    check_form(text)
+    assert export(tree) == text
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+@given(trees(HOSTILE_NAMES))
+def test_hostile_names_neither_break_the_file_nor_change_what_it_does(tree: Tree) -> None:
+    pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
+    check_form(export(tree))
+    replay = BtcppReplay(tree)
+    rng = random.Random(1)
+    for _ in range(3):
+        script, expected = random_run(tree.task, tree.root, rng, most=4)
+        assert replay.run(script) == expected
+
+
+def test_an_object_that_looks_like_a_number_reaches_the_action_as_it_is() -> None:
+    pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
+    actions = tuple(GroundAction("go", (name,), TRUE, ()) for name in ("007", "1e5", "inf", "nan"))
+    steps: tuple[Node, ...] = tuple(ActionNode(f"n{i}", action.name) for i, action in enumerate(actions))
+    tree = tree_of(ControlNode("n", "sequence", steps), actions=actions)
+    check_form(export(tree))
+    script = Script((), tuple((action.name, ()) for action in actions))
+    expected = Run(tuple(action.name for action in actions), "success", ())
+    assert BtcppReplay(tree).run(script) == expected
+
+
+KLEENE: list[Condition] = [
+    *(Is(0, value) for value in Truth),
+    Known(0),
+    Not(Is(0, Truth.UNKNOWN)),
+    And((Is(0, Truth.TRUE), Is(1, Truth.TRUE))),
+    Or((Is(0, Truth.TRUE), Is(1, Truth.FALSE))),
+    And((Is(0, Truth.TRUE), Is(2, Truth.TRUE))),
+    Or((Is(0, Truth.FALSE), Is(2, Truth.TRUE), Known(1))),
+    And((Or((Is(0, Truth.TRUE), Is(1, Truth.TRUE))), Not(And((Is(0, Truth.TRUE), Is(1, Truth.FALSE)))))),
+    Or((And((Is(2, Truth.TRUE), Is(1, Truth.TRUE))), And((Is(0, Truth.TRUE), Is(1, Truth.UNKNOWN))))),
+    And(()),
+    Or(()),
+]
+
+
+@pytest.mark.parametrize("condition", KLEENE, ids=str)
+def test_a_condition_has_its_kleene_value_in_every_state_and_after_every_other(condition: Condition) -> None:
+    # The condition stands alone in a Skipper before an action: true ends it with success, false with
+    # failure, unknown starts the action, whose outcome is another state, in which it is read again.
+    pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
+    variables = (Variable("p", (), True), Variable("q", ("a",), True), Variable("r", (), False))
+    go = ControlNode("n3", "sequence", (ActionNode("n4", "go()", latched=False),))
+    root = ControlNode("n1", "skipper", (ConditionNode("n2", condition), go))
+    tree = tree_of(root, *variables, actions=(GroundAction("go", (), TRUE, ()),))
+    replay = BtcppReplay(tree)
+    states = [(p, q, r) for p in (0, 1, 2) for q in (0, 1, 2) for r in (0, 2)]
+    from tests.replay.reference import STATUS, value_of
+
+    for first in states:
+        for second in states:
+            status = STATUS[value_of(condition, first)]
+            run = replay.run(Script(first, (("go()", second),)), "between")
+            if status == "running":
+                after = STATUS[value_of(condition, second)]
+                started = ("go()", "go()") if after == "running" else ("go()",)
+                assert run == Run(started, "cut" if after == "running" else after, second)  # type: ignore[arg-type]
+            else:
+                assert run == Run((), status, first)  # type: ignore[arg-type]
+
+
+def nested(levels: int, kinds: tuple[ControlKind, ...]) -> Tree:
+    """A chain of control nodes with an action at its end."""
+    node: Node = ActionNode("n0", "go()")
+    for level in range(levels):
+        node = ControlNode(f"n{level + 1}", kinds[level % len(kinds)], (node,))
+    return tree_of(node, actions=(GroundAction("go", (), TRUE, ()),))
+
+
+@pytest.mark.parametrize(
+    ("levels", "kinds"), [(DEEPEST_TREE - 1, ("sequence", "fallback", "skipper")), (5000, ("sequence",))]
+)
+def test_deep_trees_are_cut_or_flattened_to_what_the_engine_takes(
+    levels: int, kinds: tuple[ControlKind, ...]
+) -> None:
+    pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
+    tree = nested(levels, kinds)
+    check_form(export(tree))
+    run = BtcppReplay(tree).run(Script((), (("go()", ()),)))
+    assert run == Run(("go()",), "success", ())
+
+
+def test_a_tree_too_deep_for_the_engine_is_an_error() -> None:
+    with pytest.raises(BbtcError) as error:
+        export(nested(5000, ("sequence", "fallback")))
+    assert error.value.diagnostics[0].code == "BBT0705"
+
+
+def test_a_condition_too_deep_to_write_is_an_error() -> None:
+    condition: Condition = Is(0, Truth.TRUE)
+    for _ in range(5000):
+        condition = Not(condition)
+    with pytest.raises(BbtcError) as error:
+        export(tree_of(ConditionNode("n1", condition), Variable("p", (), True)))
+    assert error.value.diagnostics[0].code == "BBT0705"
+
+
+def test_a_subtree_cut_out_for_its_depth_behaves_as_in_place() -> None:
+    pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
+    for seed in range(20):
+        inner = random_tree(seed)
+        root = inner.root
+        for level in range(130):
+            kind: ControlKind = "fallback" if level % 2 else "sequence"
+            root = ControlNode(f"outer{level}", kind, (root,))
+        tree = replace(inner, root=root)
+        replay = BtcppReplay(tree)
+        assert "Part" in replay.source
+        for script, expected in varied_runs(tree.task, tree.root, seed, keep=4):
+            for timing in TIMINGS:
+                assert replay.run(script, timing) == expected
