@@ -1,0 +1,165 @@
+"""Grounding keeps the meaning of the lifted model, on random domains, by brute force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bbtc.diagnostics import BbtcError, Report
+from bbtc.ground.condition import evaluate
+from bbtc.ground.instantiate import instantiate
+from bbtc.ground.prune import prune
+from bbtc.ground.task import Factor, GroundAction, Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.model.domain import Model
+from tests.ground import reference
+from tests.ground.examples import model_of
+from tests.ground.lifted_texts import lifted_texts
+
+Change = frozenset[tuple[int, Truth]]
+_SETTINGS = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
+)
+
+
+def _grounded(text: str) -> tuple[Model, Task | None]:
+    model, report = model_of(text), Report()
+    try:
+        return model, instantiate(model, report, Limits())
+    except BbtcError as error:
+        if any(d.code != "BBT0412" for d in report.errors):
+            raise AssertionError(text) from error
+        return model, None
+
+
+def _possible(model: Model) -> dict[reference.Atom, set[Truth]]:
+    reachable, _ = reference.relaxed(model)
+    possible: dict[reference.Atom, set[Truth]] = {}
+    for atom, value in reachable:
+        possible.setdefault(atom, set()).add(value)
+    return possible
+
+
+def _distribution(factors: Iterable[Factor], state: list[Truth]) -> dict[Change, Fraction]:
+    """What the factors of an action do in a state, multiplied out."""
+    result: dict[Change, Fraction] = {frozenset(): Fraction(1)}
+    for factor in factors:
+        assert sum(outcome.probability for outcome in factor.outcomes) == 1
+        longer: dict[Change, Fraction] = {}
+        for outcome in factor.outcomes:
+            assert outcome.probability > 0
+            inner = _distribution(outcome.factors, state)
+            settings_ = {
+                pair
+                for effect in outcome.effects
+                if effect.when is None or evaluate(effect.when, state) is Truth.TRUE
+                for pair in effect.sets
+            }
+            for done, p in result.items():
+                for nested, q in inner.items():
+                    change: dict[int, Truth] = {}
+                    for variable, value in (*done, *nested, *settings_):
+                        change[variable] = max(value, change.get(variable, value))
+                    key = frozenset(change.items())
+                    longer[key] = longer.get(key, Fraction(0)) + p * q * outcome.probability
+        result = longer
+    return result
+
+
+def _successors(change: Change, state: list[Truth]) -> tuple[Truth, ...]:
+    values = list(state)
+    for variable, value in change:
+        values[variable] = value
+    return tuple(values)
+
+
+@_SETTINGS
+@given(lifted_texts())
+def test_what_is_reachable_is_what_enumeration_finds(text: str) -> None:
+    model, task = _grounded(text)
+    reachable, actions = reference.relaxed(model)
+    assert model.goal is not None
+    if task is None:
+        assert not reference.may_be(model, model.goal, {}, reachable, True)
+        return
+    assert [action.name for action in task.actions] == sorted(actions)
+    varying = {
+        f"{name}({','.join(args)})": Truth.UNKNOWN in values
+        for (name, args), values in _possible(model).items()
+        if len(values) > 1 or values == {Truth.UNKNOWN}
+    }
+    assert {variable.name: variable.three_valued for variable in task.variables} == varying
+    assert [variable.name for variable in task.variables] == sorted(varying)
+
+
+@_SETTINGS
+@given(lifted_texts(), st.data())
+def test_conditions_and_outcomes_mean_the_same(text: str, data: st.DataObject) -> None:
+    model, task = _grounded(text)
+    if task is None:
+        return
+    possible = _possible(model)
+    _, actions = reference.relaxed(model)
+    world = {atom: data.draw(st.sampled_from(sorted(values))) for atom, values in sorted(possible.items())}
+    state = [world[variable.predicate, variable.args] for variable in task.variables]
+    assert model.goal is not None
+    assert evaluate(task.goal, state) is reference.value(model, model.goal, {}, world)
+    for action in task.actions:
+        schema, binding = actions[action.name]
+        applies = reference.value(model, schema.precondition, binding, world) is Truth.TRUE
+        assert (evaluate(action.precondition, state) is Truth.TRUE) == applies
+        if applies:
+            _compare_outcomes(model, task, action, world, state)
+
+
+def _compare_outcomes(
+    model: Model, task: Task, action: GroundAction, world: reference.World, state: list[Truth]
+) -> None:
+    schema = model.schemas[action.schema]
+    binding = {p.name: arg for p, arg in zip(schema.parameters, action.args, strict=True)}
+    expected: dict[tuple[Truth, ...], Fraction] = {}
+    for change, p in reference.outcomes(model, schema.effect, binding, world).items():
+        after = {**world, **dict(change)}
+        key = tuple(after[variable.predicate, variable.args] for variable in task.variables)
+        expected[key] = expected.get(key, Fraction(0)) + p
+    found: dict[tuple[Truth, ...], Fraction] = {}
+    for numbered, p in _distribution(action.factors, state).items():
+        values = _successors(numbered, state)
+        found[values] = found.get(values, Fraction(0)) + p
+    assert found == expected
+
+
+@_SETTINGS
+@given(lifted_texts(), st.data())
+def test_pruning_keeps_what_matters(text: str, data: st.DataObject) -> None:
+    """On the variables that are left, every kept action does the same as before; what is left out
+    sets none of them."""
+    _, task = _grounded(text)
+    if task is None:
+        return
+    small = prune(task)
+    state = [data.draw(st.sampled_from(sorted(variable.values))) for variable in task.variables]
+    kept = [task.variable_index[variable.name] for variable in small.variables]
+    part = [state[index] for index in kept]
+    assert evaluate(small.goal, part) is evaluate(task.goal, state)
+    assert {s.values for s in small.initial} == {tuple(s.values[i] for i in kept) for s in task.initial}
+    for action in task.actions:
+        before: dict[tuple[Truth, ...], Fraction] = {}
+        for change, p in _distribution(action.factors, state).items():
+            values = _successors(change, state)
+            key = tuple(values[index] for index in kept)
+            before[key] = before.get(key, Fraction(0)) + p
+        if action.name not in small.action_by_name:
+            assert before == {tuple(part): Fraction(1)}
+            continue
+        after: dict[tuple[Truth, ...], Fraction] = {}
+        smaller = small.action_by_name[action.name]
+        for change, p in _distribution(smaller.factors, part).items():
+            values = _successors(change, part)
+            after[values] = after.get(values, Fraction(0)) + p
+        assert after == before
+        assert evaluate(smaller.precondition, part) is evaluate(action.precondition, state)
