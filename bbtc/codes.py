@@ -35,7 +35,7 @@ CODES: dict[str, str] = {
     "BBT0207": "argument of a wrong type",
     "BBT0208": "declared twice",
     "BBT0209": "cycle of types",
-    "BBT0210": "number or probability out of range",
+    "BBT0210": "probability out of range",
     "BBT0211": "probabilities sum above 1",
     "BBT0212": "construct not supported",
     "BBT0213": "problem without a goal",

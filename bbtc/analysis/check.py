@@ -96,7 +96,7 @@ def _hopeless_conditions(model: md.Model) -> Iterator[Diagnostic]:
             ):
                 told.add((name, reading.value))
                 message = f"nothing makes `{name}` {reading.value.word}"
-                hint = "neither `:init` nor the effect of an action that can apply"
+                hint = "`:init` does not give it, and no action that can apply sets it"
                 yield _warning("BBT0304", message, reading.span, hint, related)
 
 
@@ -193,8 +193,10 @@ def _irrelevant_actions(model: md.Model) -> Iterator[Diagnostic]:
     if model.goal is None:
         return
     _, actions = facts.relevant(model)
+    possible = facts.reached(model).actions
     for name, schema in model.schemas.items():
-        if name not in actions and next(facts.settings(schema.effect), None) is not None:
+        changes = next(facts.settings(schema.effect), None) is not None
+        if name not in actions and name in possible and changes:
             yield _warning(
                 "BBT0307",
                 f"action `{name}` cannot matter to the goal",

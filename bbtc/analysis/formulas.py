@@ -158,16 +158,15 @@ def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Cho
     drawn: list[tuple[Fraction, me.Effect, ast.Branch]] = []
     faulty = False
     for branch in node.branches:
-        value = names.number(branch.probability)
-        if value is not None and not 0 <= value <= 1:
+        value = branch.probability.value
+        if not 0 <= value <= 1:
             names.report.error(
                 "BBT0210",
                 f"probability {branch.probability.text} is outside [0, 1]",
                 branch.probability.span,
             )
-            value = None
-        faulty = faulty or value is None
-        drawn.append((value or Fraction(0), effect(names, branch.effect, scope), branch))
+            faulty = True
+        drawn.append((value, effect(names, branch.effect, scope), branch))
     total = sum((value for value, _, _ in drawn), Fraction(0))
     if faulty:
         total = Fraction(1)
@@ -213,8 +212,7 @@ def amount(names: Names, node: ast.NumericExpression, scope: Scope) -> me.Amount
     """A numeric expression over static functions, or None after an error."""
     match node:
         case ast.Number():
-            value = names.number(node)
-            return None if value is None else me.Constant(value)
+            return me.Constant(node.value)
         case ast.FluentRef(name, args, span):
             function = names.functions.get(name.key)
             if function is None:

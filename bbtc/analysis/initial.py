@@ -86,12 +86,11 @@ class _Reader:
 
     def _number(self, fluent: ast.FluentRef, value: ast.Number) -> None:
         names = self.names
-        number = names.number(value)
         function = names.functions.get(fluent.name.key)
         if function is None:
             if fluent.name.key not in names.costs and fluent.name.key not in names.rewards:
                 names.unknown("BBT0220", "function", fluent.name, names.functions)
             return
         args = names.arguments("function", fluent.name, function, fluent.args, {}, span=fluent.span)
-        if args is not None and number is not None:
-            self.numbers[fluent.name.key, args] = number
+        if args is not None:
+            self.numbers[fluent.name.key, args] = value.value

@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import Protocol
 
 from bbtc.diagnostics import Related, Report
@@ -16,8 +15,8 @@ from bbtc.source import Span
 from bbtc.syntax import ast
 
 Scope = Mapping[str, Parameter]
-_LONGEST_NUMBER = 400
-_LARGEST_EXPONENT = 400
+_NO_TYPE = ""
+"""Stands for a type that is not known, which has been reported: it fits everything."""
 
 
 class Declared(Protocol):
@@ -84,7 +83,7 @@ class Names:
     # --- types ---------------------------------------------------------------------------
 
     def types(self, names: Sequence[ast.Name]) -> tuple[str, ...]:
-        """Keys of the types of a typed list (``object`` where none is given or known)."""
+        """Keys of the types of a typed list (``object`` where none is given)."""
         found: dict[str, None] = {}
         for name in names:
             if name.key in self.hierarchy.types:
@@ -92,6 +91,7 @@ class Names:
             else:
                 known = {key: type_ for key, type_ in self.hierarchy.types.items() if key != OBJECT}
                 self.unknown("BBT0201", "type", name, known)
+                found[_NO_TYPE] = None
         return tuple(found) or (OBJECT,)
 
     def parameters(self, groups: ast.TypedList) -> tuple[Parameter, ...]:
@@ -171,27 +171,11 @@ class Names:
     def _fits(self, arg: ast.Term, given: tuple[str, ...], wanted: tuple[str, ...]) -> bool:
         """An object must be of the wanted type. A parameter may be of a more general one, as in
         many public files: its bindings decide."""
-        if wanted in {given, (OBJECT,)}:
+        if wanted in {given, (OBJECT,)} or _NO_TYPE in given or _NO_TYPE in wanted:
             return True
         if isinstance(arg, ast.Name):
             return self.hierarchy.contains(wanted, self.objects[arg.key])
         return self.hierarchy.overlaps(given, wanted)
-
-    # --- numbers -------------------------------------------------------------------------
-
-    def number(self, number: ast.Number) -> Fraction | None:
-        """The exact value, or None after reporting that there is none within reason."""
-        mantissa, _, exponent = number.text.lower().partition("e")
-        exponent = exponent.lstrip("+-0") or "0"
-        if max(len(mantissa), len(exponent) * 100) > _LONGEST_NUMBER or int(exponent) > _LARGEST_EXPONENT:
-            shown = number.text if len(number.text) <= 40 else number.text[:37] + "..."
-            self.report.error("BBT0210", f"the number `{shown}` is too long", number.span)
-            return None
-        try:
-            return number.value
-        except ZeroDivisionError:
-            self.report.error("BBT0210", f"`{number.text}` divides by zero", number.span)
-            return None
 
 
 def nearest(key: str, known: Iterable[str]) -> str | None:

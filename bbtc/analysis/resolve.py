@@ -293,9 +293,7 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
     goal, goal_span = _goal(names, model, problem)
     probability, reward = Fraction(1), Fraction(0)
     for number in sections(problem, ast.GoalNumber):
-        value = names.number(number.value)
-        if value is None:
-            continue
+        value = number.value.value
         if number.kind == "goal-reward":
             reward = value
         elif not 0 < value <= 1:

@@ -1,0 +1,6 @@
+(define (domain d)
+  (:predicates (p) (q) (base))
+  (:derived (p) (not (q)))
+  (:derived (q) (or (base) (p)))
+  (:action go :effect (base)))
+(define (problem x) (:domain d) (:init) (:goal (p)))

@@ -1,0 +1,7 @@
+(define (domain d)
+  (:predicates (p))
+  (:action go :effect (p))
+  (:init (p)))
+(define (problem x) (:domain d)
+  (:predicates (q))
+  (:init) (:goal (p)))

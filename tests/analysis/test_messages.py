@@ -1,0 +1,47 @@
+"""What users read when names, types or probabilities are wrong: `errors/*.pddl`, each with its `.txt`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bbtc.analysis.check import check
+from bbtc.analysis.resolve import resolve
+from bbtc.codes import CODES
+from bbtc.diagnostics import Report
+from bbtc.source import SourceFile
+from bbtc.syntax.parser import parse
+
+CASES = sorted((Path(__file__).parent / "errors").glob("*.pddl"))
+
+
+def _report(path: Path) -> Report:
+    report = Report()
+    document = parse(SourceFile(path.name, path.read_text("utf-8")), report)
+    found = {definition.kind: definition for definition in document.definitions}
+    model = resolve(found["domain"], found.get("problem"), report)
+    assert (model is None) == bool(report.errors)
+    if model is not None:
+        for diagnostic in check(model):
+            report.add(diagnostic)
+    return report
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_messages_are_as_written_down(path: Path, request: pytest.FixtureRequest) -> None:
+    expected = path.with_suffix(".txt")
+    actual = "\n".join(diagnostic.render() for diagnostic in _report(path)) + "\n"
+    if request.config.getoption("--update-golden"):
+        expected.write_text(actual, "utf-8")
+    assert expected.exists(), "no expectation; run with --update-golden and read it"
+    assert actual == expected.read_text("utf-8")
+
+
+def test_every_message_has_a_place() -> None:
+    assert [d for path in CASES for d in _report(path) if d.span is None] == []
+
+
+def test_every_code_of_names_and_checks_is_shown_by_a_case() -> None:
+    shown = {diagnostic.code for path in CASES for diagnostic in _report(path)}
+    assert {code for code in CODES if code[3:5] in {"02", "03"}} - shown == set()
