@@ -79,6 +79,6 @@
         (skipper
           (condition (present ?to))
           (sequence (knock ?to ?desk) (condition (known (present ?to)))))
-        (sequence (phone ?to) (condition (present ?to))))
+        (sequence (action phone ?to) (condition (present ?to))))
       (hand_over ?thing ?to ?desk)
       (condition (handed ?thing ?to)))))

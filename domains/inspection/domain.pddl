@@ -73,7 +73,7 @@
       (located ?valve ?area)
       (at ?area))
     :effect (and
-      (probabilistic 0.8 (closed ?valve) 0.05 (jammed ?valve))
+      (probabilistic 0.7 (closed ?valve) 0.05 (jammed ?valve))
       (increase (total-cost) 4)))
 
   ; Vibration pads shake a jammed valve loose, now and then.

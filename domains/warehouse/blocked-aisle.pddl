@@ -12,5 +12,5 @@
          (stored saw b1)
          (unknown (stored drill b1)))
   (:goal (delivered saw))
-  (:goal-probability 0.9)
+  (:goal-probability 0.75)
   (:metric minimize (total-cost)))

@@ -50,7 +50,8 @@
     :effect (and
       (probabilistic
         0.7 (stored ?item ?shelf)
-        0.2 (not (stored ?item ?shelf)))   ; else the label could not be read
+        0.2 (not (stored ?item ?shelf))
+        0.1 (increase (total-cost) 2))     ; the label cannot be read, and trying took its time
       (increase (total-cost) 1)))
 
   (:action fetch

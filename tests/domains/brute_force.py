@@ -1,0 +1,95 @@
+"""The figures of a tree by forward propagation, written apart from :mod:`bbtc.belief`.
+
+It shares the data classes with the package and nothing else: ticks come from the plain reading of
+the semantics in ``tests/replay/reference.py``, effects are applied here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from bbtc.ground.task import Factor, Outcome, Task
+from bbtc.tree.nodes import Node
+from tests.replay.reference import Ticking, value_of
+from tests.replay.script import Values
+
+
+@dataclass
+class Totals:
+    """Probabilities of the three ends, and what a run costs and does on average."""
+
+    ends: dict[str, Fraction] = field(
+        default_factory=lambda: {"success": Fraction(0), "failure": Fraction(0), "running": Fraction(0)}
+    )
+    cost: Fraction = Fraction(0)
+    actions: Fraction = Fraction(0)
+    reward: Fraction = Fraction(0)
+
+
+def brute_force(task: Task, root: Node) -> Totals:
+    """Step by step through every run of a tree whose actions are all latched."""
+    totals = Totals()
+    runs: dict[tuple[Values, frozenset[str]], Fraction] = {}
+    for state in task.initial:
+        key = (tuple(int(value) for value in state.values), frozenset[str]())
+        runs[key] = runs.get(key, Fraction(0)) + state.probability
+    while runs:
+        following: dict[tuple[Values, frozenset[str]], Fraction] = {}
+        for (values, finished), probability in runs.items():
+            run = Ticking(task, values, set(finished))
+            status = run.tick(root)
+            node = run.started
+            if node is None:
+                totals.ends[status] += probability
+                continue
+            assert node.latched
+            action = task.action_by_name[node.action]
+            assert value_of(action.precondition, values) == "T", "started without its precondition"
+            totals.actions += probability
+            for chance, sets, cost, reward in _every(action.factors, values):
+                share = probability * chance
+                totals.cost += share * (action.cost + cost)
+                totals.reward += share * reward
+                key = (_changed(values, sets), finished | {node.id})
+                following[key] = following.get(key, Fraction(0)) + share
+        runs = following
+    return totals
+
+
+_Sets = tuple[tuple[int, int], ...]
+
+
+def _every(
+    factors: tuple[Factor, ...], values: Values
+) -> Iterator[tuple[Fraction, _Sets, Fraction, Fraction]]:
+    """Every combination of one outcome for each factor: probability, settings, cost, reward."""
+    if not factors:
+        yield Fraction(1), (), Fraction(0), Fraction(0)
+        return
+    for outcome in factors[0].outcomes:
+        for p, sets, cost, reward in _every(outcome.factors + factors[1:], values):
+            yield (
+                outcome.probability * p,
+                _settings(outcome, values) + sets,
+                outcome.cost + cost,
+                outcome.reward + reward,
+            )
+
+
+def _settings(outcome: Outcome, values: Values) -> _Sets:
+    return tuple(
+        (variable, int(value))
+        for effect in outcome.effects
+        if effect.when is None or value_of(effect.when, values) == "T"
+        for variable, value in effect.sets
+    )
+
+
+def _changed(values: Values, sets: _Sets) -> Values:
+    """The values after all settings at once; of two values for one variable the greater wins."""
+    after = list(values)
+    for variable in {variable for variable, _ in sets}:
+        after[variable] = max(value for each, value in sets if each == variable)
+    return tuple(after)

@@ -1,0 +1,118 @@
+"""Every problem under ``domains/``, and every artefact the command line makes of it."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from click.testing import CliRunner
+
+from bbtc.cli.main import cli
+from bbtc.diagnostics import Report
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.pipeline import compile_sources, plan_task
+from bbtc.plan.result import Plan
+from bbtc.syntax.reader import read_source
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True, order=True)
+class Problem:
+    """A problem of one of our domains."""
+
+    domain: str
+    name: str
+
+    @property
+    def files(self) -> tuple[str, str]:
+        """The paths of the domain and the problem, from the top of the repository."""
+        return f"domains/{self.domain}/domain.pddl", f"domains/{self.domain}/{self.name}.pddl"
+
+    def __str__(self) -> str:
+        return f"{self.domain}/{self.name}"
+
+
+PROBLEMS = sorted(
+    Problem(path.parent.name, path.stem)
+    for path in (REPOSITORY / "domains").glob("*/*.pddl")
+    if path.name != "domain.pddl"
+)
+DOMAINS = sorted({problem.domain for problem in PROBLEMS})
+
+
+@functools.cache
+def task_of(problem: Problem) -> Task:
+    """The ground task."""
+    sources = [read_source(str(REPOSITORY / file)) for file in problem.files]
+    return compile_sources(sources, Report(), Limits())
+
+
+@functools.cache
+def plan_of(problem: Problem) -> Plan:
+    """The plan for the problem's own target."""
+    return plan_task(task_of(problem), None, "refine", Limits(), lambda _: None)
+
+
+# --- the command line ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command wrote, and its exit status."""
+
+    status: int
+    out: bytes
+    err: str
+
+
+@contextmanager
+def _top_of_repository() -> Iterator[None]:
+    before = Path.cwd()
+    os.chdir(REPOSITORY)
+    try:
+        yield
+    finally:
+        os.chdir(before)
+
+
+def bbtc(*arguments: str, stdin: bytes | None = None) -> Done:
+    """Run the command line at the top of the repository, in this process."""
+    # click 8.1 mixes stderr into stdout unless told; 8.2 never does and has no such option.
+    apart: dict[str, Any] = (
+        {"mix_stderr": False} if "mix_stderr" in inspect.signature(CliRunner).parameters else {}
+    )
+    runner = CliRunner(**apart)
+    with _top_of_repository():
+        result = runner.invoke(cli, list(arguments), input=stdin)
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return Done(result.exit_code, result.stdout_bytes, result.stderr)
+
+
+EXPORTS = {"tree.dot": "dot", "tree.xml": "btcpp", "tree.py": "py_trees"}
+
+
+def artefacts(problem: Problem) -> dict[str, bytes]:
+    """Every artefact of a problem, by file name."""
+    made: dict[str, bytes] = {}
+
+    def run(*arguments: str, stdin: bytes | None = None) -> Done:
+        done = bbtc(*arguments, stdin=stdin)
+        assert done.status == 0, f"bbtc {' '.join(arguments)}: exit status {done.status}\n{done.err}"
+        return done
+
+    made["task.json"] = run("compile", *problem.files).out
+    planned = run("plan", *problem.files)
+    made["tree.json"], made["plan.txt"] = planned.out, planned.err.encode()
+    for name, form in EXPORTS.items():
+        made[name] = run("export", "-", "--to", form, stdin=planned.out).out
+    made["simulate.txt"] = run("simulate", "-", "--scenarios", "5", stdin=planned.out).out
+    return made

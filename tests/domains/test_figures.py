@@ -1,0 +1,89 @@
+"""The plans for our domains: sound, as good as they say, and in the paper's case, as in the paper."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from bbtc.belief.chain import explore
+from bbtc.belief.soundness import violations
+from bbtc.limits import Limits
+from bbtc.tree.validate import tree_problems
+from tests.domains.brute_force import brute_force
+from tests.domains.problems import DOMAINS, PROBLEMS, Problem, bbtc, plan_of, task_of
+
+
+@pytest.mark.parametrize("domain", DOMAINS)
+def test_nothing_is_doubtful_in_a_domain(domain: str) -> None:
+    """With a problem, warnings tell what that problem has no use for."""
+    done = bbtc("check", f"domains/{domain}/domain.pddl")
+    assert (done.status, done.out, done.err) == (0, b"", "1 file checked, 0 warnings\n")
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_the_target_is_reached(problem: Problem) -> None:
+    plan = plan_of(problem)
+    assert plan.tree.status == "target-reached"
+    assert plan.tree.success_probability == plan.figures.success >= task_of(problem).goal_probability
+
+
+@pytest.mark.parametrize("domain", DOMAINS)
+def test_a_domain_has_a_problem_that_takes_more_than_luck(domain: str) -> None:
+    """At least one problem starts at a lower probability, ends below 1, and takes refinements."""
+    plans = [plan_of(problem) for problem in PROBLEMS if problem.domain == domain]
+    assert len(plans) >= 2
+    assert any(
+        plan.initial_success < plan.tree.success_probability < 1 and len(plan.refinements) > 1
+        for plan in plans
+    )
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_the_tree_is_sound(problem: Problem) -> None:
+    tree = plan_of(problem).tree
+    assert list(tree_problems(tree)) == []
+    assert violations(tree.task, explore(tree.task, tree.root, Limits())) == []
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_figures_agree_with_brute_force(problem: Problem) -> None:
+    plan = plan_of(problem)
+    totals = brute_force(plan.tree.task, plan.tree.root)
+    figures = plan.figures
+    assert totals.ends == {"success": figures.success, "failure": figures.failure, "running": figures.blocked}
+    assert (totals.cost, totals.actions, totals.reward) == (figures.cost, figures.actions, figures.reward)
+    assert sum(totals.ends.values()) == 1
+
+
+# --- the paper's scenario --------------------------------------------------------------------
+
+
+def test_the_household_refines_as_in_the_paper() -> None:
+    plan = plan_of(Problem("household", "look-for-soda"))
+    assert [step.inserted for step in plan.refinements] == [
+        "detect(soda)",
+        "light_on()",
+        "find(soda)",
+        "find(soda)",
+    ]
+    assert [step.success for step in plan.refinements] == [
+        0,
+        Fraction(1, 2),
+        Fraction(7, 8),
+        Fraction(31, 32),
+    ]
+
+
+def test_the_household_says_so() -> None:
+    done = bbtc("plan", *Problem("household", "look-for-soda").files)
+    assert done.status == 0
+    assert "target 9/10 (0.9) reached: success probability 31/32 (0.96875)" in done.err
+
+
+@pytest.mark.parametrize(
+    ("name", "success"), [("grasp-soda", Fraction(1) - Fraction(4, 5) ** 4), ("look-in-fridge", Fraction(1))]
+)
+def test_grasping_and_the_fridge(name: str, success: Fraction) -> None:
+    """A grasp holds one time in five; four of them reach one half."""
+    assert plan_of(Problem("household", name)).tree.success_probability == success

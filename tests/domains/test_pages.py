@@ -1,0 +1,127 @@
+"""The pages in ``docs/domains/``: every figure, refinement and tree on them is what bbtc says now.
+
+What is made stands between ``<!-- kind: what -->`` and ``<!-- end -->``; ``--update-golden`` writes
+it anew.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+
+import pytest
+
+from bbtc.belief.chain import explore
+from bbtc.belief.scenarios import scenarios
+from bbtc.cli.wording import exact
+from bbtc.ground.describe import describe
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.tree.nodes import ConditionNode, ControlNode, Node, walk
+from tests.conftest import Golden
+from tests.domains.constructs import users
+from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc, plan_of, task_of
+
+PAGES = REPOSITORY / "docs" / "domains"
+MADE = re.compile(r"(?<=<!-- )(?!end )(\w+)(?:: ([\w/-]+))? -->\n.*?(?=<!-- end -->)", re.DOTALL)
+SIGNS = {"sequence": "→", "fallback": "?", "skipper": "⇒"}
+
+
+def outline(task: Task, node: Node, depth: int = 0) -> str:
+    """A tree as indented text: signs of control nodes, conditions, actions in brackets."""
+    indent = "  " * depth
+    if isinstance(node, ControlNode):
+        label = f"{SIGNS[node.kind]} {node.template or ''}".rstrip()
+        return f"{indent}{label}\n" + "".join(outline(task, child, depth + 1) for child in node.children)
+    if isinstance(node, ConditionNode):
+        return f"{indent}{describe(task, node.condition)}\n"
+    return f"{indent}[{node.action}]\n"
+
+
+def fenced(text: str) -> str:
+    """The text in a code block."""
+    return f"\n```text\n{text}```\n\n"
+
+
+def tree(problem: Problem) -> str:
+    """The tree as an outline."""
+    return fenced(outline(task_of(problem), plan_of(problem).tree.root))
+
+
+def plan(problem: Problem) -> str:
+    """What ``bbtc plan`` tells about its refinements."""
+    lines = bbtc("plan", *problem.files).err.splitlines()
+    last = next(number for number, line in enumerate(lines) if line.startswith("target "))
+    return fenced("".join(f"{line}\n" for line in lines[: last + 1]))  # warnings follow
+
+
+def figures(domain: str) -> str:
+    """A table of the problems of a domain with their exact figures."""
+    rows = [
+        "| problem | target | success | refinements | nodes | belief states | scenarios | cost | actions |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for problem in PROBLEMS:
+        if problem.domain == domain:
+            made = plan_of(problem)
+            runs = scenarios(explore(made.tree.task, made.tree.root, Limits()))
+            count = sum(1 for _ in itertools.islice(runs, 500))
+            cells = [
+                f"[{problem.name}](../../{problem.files[1]})",
+                exact(made.tree.target),
+                exact(made.tree.success_probability),
+                str(len(made.refinements)),
+                str(sum(1 for _ in walk(made.tree.root))),
+                str(made.figures.states),
+                "over 500" if count == 500 else str(count),
+                "∞" if made.figures.cost is None else exact(made.figures.cost),
+                "∞" if made.figures.actions is None else exact(made.figures.actions),
+            ]
+            rows.append(f"| {' | '.join(cells)} |")
+    return "\n" + "".join(f"{row}\n" for row in rows) + "\n"
+
+
+def constructs() -> str:
+    """A table of the constructs of the language and the domains that use them."""
+    rows = ["| construct | used in |", "|---|---|"]
+    for name, domains in users().items():
+        rows.append(f"| {name} | {', '.join(f'[{d}]({d}.md)' for d in domains)} |")
+    return "\n" + "".join(f"{row}\n" for row in rows) + "\n"
+
+
+def made(kind: str, what: str) -> str:
+    """What belongs between the marks."""
+    match kind:
+        case "tree":
+            return tree(Problem(*what.split("/")))
+        case "plan":
+            return plan(Problem(*what.split("/")))
+        case "figures":
+            return figures(what)
+        case "constructs":
+            return constructs()
+        case _:
+            raise AssertionError(f"nothing makes {kind}")
+
+
+@pytest.mark.parametrize("page", ["README", *DOMAINS])
+def test_what_a_page_shows_is_what_bbtc_says(page: str, golden: Golden) -> None:
+    file = PAGES / f"{page}.md"
+    text = file.read_text(encoding="utf-8")
+    now = MADE.sub(lambda m: f"{m[1]}{': ' + m[2] if m[2] else ''} -->\n{made(m[1], m[2] or '')}", text)
+    assert text.count("<!-- end -->") == len(MADE.findall(text)) > 0
+    if golden.update and now != text:
+        file.write_text(now, encoding="utf-8")
+    else:
+        assert text == now, "run pytest tests/domains/test_pages.py --update-golden, and read the prose again"
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_a_page_shows_every_problem(problem: Problem) -> None:
+    text = (PAGES / f"{problem.domain}.md").read_text(encoding="utf-8")
+    for mark in (f"figures: {problem.domain}", f"plan: {problem}", f"tree: {problem}"):
+        assert f"<!-- {mark} -->" in text
+
+
+def test_every_construct_is_used_somewhere() -> None:
+    assert [name for name, domains in users().items() if not domains] == []

@@ -1,0 +1,925 @@
+"""Behavior tree for the problem gift-set of the domain kitting. Made by bbtc.
+
+In the model of that domain it succeeds with probability 635449916832017/737280000000000.
+Implement the class Robot, and run
+
+    run(create_root(MyRobot()), period=0.1)
+
+As a program, this module runs the tree in a simulated world (--help tells how).
+It needs py_trees 2.2 or later.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import time
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from typing import Protocol, TypeVar
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite, Selector, Sequence
+from py_trees.decorators import Decorator
+from py_trees.trees import BehaviourTree
+
+
+class Robot(Protocol):
+    """What the tree needs of a robot.
+
+    A condition answers at once: True, False, or None where it is unknown. An action is called in
+    every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
+    conditions show what it did.
+    """
+
+    def cancel(self, action: str) -> None:
+        """The running action, named as in the tree, is no longer wanted."""
+
+    def gripper_free(self) -> bool:
+        """Whether gripper_free() holds."""
+
+    def holding(self, item: str) -> bool | None:
+        """Whether holding(item) holds; None where that is unknown."""
+
+    def in_view(self, item: str) -> bool:
+        """Whether in_view(item) holds."""
+
+    def lost(self, item: str) -> bool:
+        """Whether lost(item) holds."""
+
+    def packed(self, item: str, into: str) -> bool:
+        """Whether packed(item, into) holds."""
+
+    def look_for(self, item: str) -> Status:
+        """Start or continue look_for(item)."""
+
+    def pick(self, item: str) -> Status:
+        """Start or continue pick(item)."""
+
+    def place(self, item: str, into: str) -> Status:
+        """Start or continue place(item, into)."""
+
+    def read_force_sensor(self, item: str) -> Status:
+        """Start or continue read_force_sensor(item)."""
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def negated(value: bool | None) -> bool | None:
+    """Three-valued "not": unknown stays unknown."""
+    return None if value is None else not value
+
+
+class Condition(Behaviour):
+    """SUCCESS, FAILURE or RUNNING for a condition that is True, False or None (unknown)."""
+
+    def __init__(self, name: str, read: Callable[[], bool | None]) -> None:
+        super().__init__(name=name)
+        self._read = read
+
+    def update(self) -> Status:
+        value = self._read()
+        if value is None:
+            return Status.RUNNING
+        return Status.SUCCESS if value else Status.FAILURE
+
+
+class Action(Behaviour):
+    """Calls the robot at every tick until the action ends; cancels it if it is no longer wanted."""
+
+    def __init__(self, name: str, act: Callable[[], Status], cancel: Callable[[str], None]) -> None:
+        super().__init__(name=name)
+        self._act = act
+        self._cancel = cancel
+
+    def update(self) -> Status:
+        status = self._act()
+        if status not in (Status.SUCCESS, Status.FAILURE, Status.RUNNING):
+            raise TypeError(f"{self.name} returned {status!r}, not SUCCESS, FAILURE or RUNNING")
+        return status
+
+    def terminate(self, new_status: Status) -> None:
+        if self.status == Status.RUNNING and new_status == Status.INVALID:
+            self._cancel(self.name)
+
+
+class Latch(Decorator):
+    """Runs its action once and returns how it ended at every later tick. The status is withheld
+    until the next tick, because conditions to the left were read before the action's effect. An
+    action interrupted after its start counts as run. A guard must be True for it to start; with
+    ``keep=False`` it starts again whenever it is ticked."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name=name, child=Action(name, act, cancel))
+        self.acting = False
+        self._guard = guard
+        self._keep = keep
+        self._started = False
+        self._final: Status | None = None
+
+    def tick(self) -> Iterator[Behaviour]:
+        self.acting = False
+        if self._final is not None:
+            self.stop(self._final)
+            yield self
+            return
+        ready = True if self._started or self._guard is None else self._guard()
+        if ready:
+            if not self._started:
+                self._preempt()
+            self.acting = self._started = True
+            yield from self.decorated.tick()
+            if self.decorated.status != Status.RUNNING:
+                self._end(self.decorated.status)
+        if ready or ready is None:
+            self.status = Status.RUNNING
+        else:
+            self.stop(Status.FAILURE)
+        yield self
+
+    def update(self) -> Status:
+        return self.status
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status == Status.INVALID and self._started:
+            self._end(Status.SUCCESS)
+
+    def _preempt(self) -> None:
+        # py_trees would interrupt the action that ran before only after this one has started: the
+        # robot, asked for the same action by both, could not tell the second from the first.
+        root: Behaviour = self
+        while root.parent is not None:
+            root = root.parent
+        for node in root.iterate():
+            if isinstance(node, Latch) and node is not self and node.status == Status.RUNNING:
+                node.stop(Status.INVALID)
+
+    def _end(self, status: Status) -> None:
+        self._started = False
+        self._final = status if self._keep else None
+
+
+class Skipper(Composite):
+    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
+
+    def tick(self) -> Iterator[Behaviour]:
+        status = Status.RUNNING
+        for child in self.children:
+            yield from child.tick()
+            self.current_child = child
+            status = child.status
+            if status != Status.RUNNING:
+                break
+        if status != Status.RUNNING:
+            for child in self.children:
+                if child is not self.current_child and child.status != Status.INVALID:
+                    child.stop(Status.INVALID)
+            self.stop(status)
+        self.status = status
+        yield self
+
+
+def sequence(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children succeed. Every tick starts at the first child."""
+    return Sequence(name, memory=False, children=list(children))
+
+
+def fallback(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children fail. Every tick starts at the first child."""
+    return Selector(name, memory=False, children=list(children))
+
+
+def skipper(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children are running. Every tick starts at the first child."""
+    return Skipper(name, children=list(children))
+
+
+class StopWhenBlocked(Decorator):
+    """FAILURE where the tree is RUNNING but no action is: something is unknown that nothing can
+    observe, and nothing would ever change."""
+
+    def __init__(self, child: Behaviour) -> None:
+        super().__init__(name="stop when blocked", child=child)
+
+    def update(self) -> Status:
+        status = self.decorated.status
+        if status == Status.RUNNING and not any(
+            isinstance(node, Latch) and node.acting and node.status == Status.RUNNING
+            for node in self.decorated.iterate()
+        ):
+            self.feedback_message = "blocked: nothing can observe what is unknown"
+            return Status.FAILURE
+        return status
+
+
+def run(root: Behaviour, period: float = 0.0) -> Status:
+    """Tick a tree until it ends, with a pause of ``period`` seconds between ticks."""
+    tree = BehaviourTree(root)
+    while True:
+        tree.tick()
+        if root.status != Status.RUNNING:
+            return root.status
+        time.sleep(period)
+
+
+def create_root(robot: Robot) -> Behaviour:
+    """The tree. Latches stay latched, so it runs once: make a new one for another run."""
+    return StopWhenBlocked(
+        sequence(
+            "sequence",
+            fallback(
+                "fallback",
+                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                sequence(
+                    "sequence for packed(wine,crate1)",
+                    fallback(
+                        "fallback",
+                        skipper(
+                            "skipper",
+                            Condition("holding(wine)", lambda: robot.holding("wine")),
+                            fallback(
+                                "fallback",
+                                sequence(
+                                    "sequence for holding(wine)",
+                                    Latch(
+                                        "read_force_sensor(wine)",
+                                        lambda: robot.read_force_sensor("wine"),
+                                        robot.cancel,
+                                    ),
+                                    Condition(
+                                        "known holding(wine)",
+                                        lambda: robot.holding("wine") is not None,
+                                    ),
+                                ),
+                                sequence(
+                                    "sequence for holding(wine)",
+                                    Latch(
+                                        "read_force_sensor(wine)",
+                                        lambda: robot.read_force_sensor("wine"),
+                                        robot.cancel,
+                                    ),
+                                    Condition(
+                                        "known holding(wine)",
+                                        lambda: robot.holding("wine") is not None,
+                                    ),
+                                ),
+                            ),
+                        ),
+                        sequence(
+                            "sequence for holding(wine)",
+                            sequence(
+                                "secure(wine)",
+                                fallback(
+                                    "fallback",
+                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
+                                    Latch(
+                                        "look_for(wine)",
+                                        lambda: robot.look_for("wine"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("wine")),
+                                            negated(robot.lost("wine")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(wine)",
+                                    lambda: robot.pick("wine"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("wine"),
+                                        negated(robot.holding("wine")),
+                                        negated(robot.lost("wine")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(wine)",
+                                    lambda: robot.read_force_sensor("wine"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("wine") is None,
+                                ),
+                                Condition("holding(wine)", lambda: robot.holding("wine")),
+                            ),
+                            Condition("holding(wine)", lambda: robot.holding("wine")),
+                        ),
+                        sequence(
+                            "sequence for holding(wine)",
+                            sequence(
+                                "secure(wine)",
+                                fallback(
+                                    "fallback",
+                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
+                                    Latch(
+                                        "look_for(wine)",
+                                        lambda: robot.look_for("wine"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("wine")),
+                                            negated(robot.lost("wine")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(wine)",
+                                    lambda: robot.pick("wine"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("wine"),
+                                        negated(robot.holding("wine")),
+                                        negated(robot.lost("wine")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(wine)",
+                                    lambda: robot.read_force_sensor("wine"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("wine") is None,
+                                ),
+                                Condition("holding(wine)", lambda: robot.holding("wine")),
+                            ),
+                            Condition("holding(wine)", lambda: robot.holding("wine")),
+                        ),
+                        sequence(
+                            "sequence for holding(wine)",
+                            sequence(
+                                "secure(wine)",
+                                fallback(
+                                    "fallback",
+                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
+                                    Latch(
+                                        "look_for(wine)",
+                                        lambda: robot.look_for("wine"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("wine")),
+                                            negated(robot.lost("wine")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(wine)",
+                                    lambda: robot.pick("wine"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("wine"),
+                                        negated(robot.holding("wine")),
+                                        negated(robot.lost("wine")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(wine)",
+                                    lambda: robot.read_force_sensor("wine"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("wine") is None,
+                                ),
+                                Condition("holding(wine)", lambda: robot.holding("wine")),
+                            ),
+                            Condition("holding(wine)", lambda: robot.holding("wine")),
+                        ),
+                    ),
+                    Latch(
+                        "place(wine,crate1)",
+                        lambda: robot.place("wine", "crate1"),
+                        robot.cancel,
+                    ),
+                    Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                ),
+                sequence(
+                    "sequence for packed(wine,crate1)",
+                    Condition("holding(wine)", lambda: robot.holding("wine")),
+                    Latch(
+                        "place(wine,crate1)",
+                        lambda: robot.place("wine", "crate1"),
+                        robot.cancel,
+                    ),
+                    Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                ),
+            ),
+            fallback(
+                "fallback",
+                Condition(
+                    "packed(chocolates,crate1)",
+                    lambda: robot.packed("chocolates", "crate1"),
+                ),
+                sequence(
+                    "sequence for packed(chocolates,crate1)",
+                    fallback(
+                        "fallback",
+                        skipper(
+                            "skipper",
+                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
+                            fallback(
+                                "fallback",
+                                sequence(
+                                    "sequence for holding(chocolates)",
+                                    Latch(
+                                        "read_force_sensor(chocolates)",
+                                        lambda: robot.read_force_sensor("chocolates"),
+                                        robot.cancel,
+                                    ),
+                                    Condition(
+                                        "known holding(chocolates)",
+                                        lambda: robot.holding("chocolates") is not None,
+                                    ),
+                                ),
+                                sequence(
+                                    "sequence for holding(chocolates)",
+                                    Latch(
+                                        "read_force_sensor(chocolates)",
+                                        lambda: robot.read_force_sensor("chocolates"),
+                                        robot.cancel,
+                                    ),
+                                    Condition(
+                                        "known holding(chocolates)",
+                                        lambda: robot.holding("chocolates") is not None,
+                                    ),
+                                ),
+                            ),
+                        ),
+                        sequence(
+                            "sequence for holding(chocolates)",
+                            sequence(
+                                "secure(chocolates)",
+                                fallback(
+                                    "fallback",
+                                    Condition(
+                                        "in_view(chocolates)",
+                                        lambda: robot.in_view("chocolates"),
+                                    ),
+                                    Latch(
+                                        "look_for(chocolates)",
+                                        lambda: robot.look_for("chocolates"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("chocolates")),
+                                            negated(robot.lost("chocolates")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(chocolates)",
+                                    lambda: robot.pick("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("chocolates"),
+                                        negated(robot.holding("chocolates")),
+                                        negated(robot.lost("chocolates")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(chocolates)",
+                                    lambda: robot.read_force_sensor("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("chocolates") is None,
+                                ),
+                                Condition(
+                                    "holding(chocolates)",
+                                    lambda: robot.holding("chocolates"),
+                                ),
+                            ),
+                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
+                        ),
+                        sequence(
+                            "sequence for holding(chocolates)",
+                            sequence(
+                                "secure(chocolates)",
+                                fallback(
+                                    "fallback",
+                                    Condition(
+                                        "in_view(chocolates)",
+                                        lambda: robot.in_view("chocolates"),
+                                    ),
+                                    Latch(
+                                        "look_for(chocolates)",
+                                        lambda: robot.look_for("chocolates"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("chocolates")),
+                                            negated(robot.lost("chocolates")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(chocolates)",
+                                    lambda: robot.pick("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("chocolates"),
+                                        negated(robot.holding("chocolates")),
+                                        negated(robot.lost("chocolates")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(chocolates)",
+                                    lambda: robot.read_force_sensor("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("chocolates") is None,
+                                ),
+                                Condition(
+                                    "holding(chocolates)",
+                                    lambda: robot.holding("chocolates"),
+                                ),
+                            ),
+                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
+                        ),
+                        sequence(
+                            "sequence for holding(chocolates)",
+                            sequence(
+                                "secure(chocolates)",
+                                fallback(
+                                    "fallback",
+                                    Condition(
+                                        "in_view(chocolates)",
+                                        lambda: robot.in_view("chocolates"),
+                                    ),
+                                    Latch(
+                                        "look_for(chocolates)",
+                                        lambda: robot.look_for("chocolates"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("chocolates")),
+                                            negated(robot.lost("chocolates")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(chocolates)",
+                                    lambda: robot.pick("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("chocolates"),
+                                        negated(robot.holding("chocolates")),
+                                        negated(robot.lost("chocolates")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(chocolates)",
+                                    lambda: robot.read_force_sensor("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("chocolates") is None,
+                                ),
+                                Condition(
+                                    "holding(chocolates)",
+                                    lambda: robot.holding("chocolates"),
+                                ),
+                            ),
+                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
+                        ),
+                    ),
+                    Latch(
+                        "place(chocolates,crate1)",
+                        lambda: robot.place("chocolates", "crate1"),
+                        robot.cancel,
+                    ),
+                    Condition(
+                        "packed(chocolates,crate1)",
+                        lambda: robot.packed("chocolates", "crate1"),
+                    ),
+                ),
+            ),
+        ),
+    )
+
+
+Fact = tuple[str, ...]
+State = dict[Fact, bool | None]
+T = TypeVar("T")
+
+
+class Effect:
+    """Changes that happen if ``when`` is True in the state before the action."""
+
+    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+        self.changes = changes
+        self.when = when
+
+
+class Outcome:
+    """Effects of one thing that may happen, and independent choices that follow if it does."""
+
+    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
+        self.effects = effects
+        self.then = then or []
+
+
+Factor = list[tuple[str, Outcome]]
+
+
+def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
+    """One of the values, with exactly the given probabilities."""
+    weights = [Fraction(probability) for probability, _ in choices]
+    whole = math.lcm(*(weight.denominator for weight in weights))
+    point = rng.randrange(whole)
+    for weight, (_, value) in zip(weights, choices, strict=True):
+        point -= int(weight * whole)
+        if point < 0:
+            return value
+    return choices[-1][1]
+
+
+def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
+    """What an action changes: one outcome of every factor. All conditions are read before any
+    change; where changes clash, True wins over None (unknown), and None over False."""
+    changes: State = {}
+    strength = {False: 0, None: 1, True: 2}
+    for factor in factors:
+        outcome = draw(rng, factor)
+        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
+        drawn.append(happen(rng, outcome.then, before))
+        for part in drawn:
+            for fact, value in part.items():
+                if fact not in changes or strength[value] > strength[changes[fact]]:
+                    changes[fact] = value
+    return changes
+
+
+class World:
+    """A world that behaves as the domain says, by chance. The outcome of an action applies at
+    once; the tree looks at it in the next tick."""
+
+    def __init__(
+        self,
+        initial: list[tuple[str, State]],
+        actions: dict[Fact, list[Factor]],
+        rng: random.Random,
+        report: Callable[[str], None],
+    ) -> None:
+        start: State = draw(rng, initial)
+        self._state = dict(start)
+        self._actions = actions
+        self._rng = rng
+        self._report = report
+
+    def cancel(self, action: str) -> None:
+        """Nothing to do: no action here runs for longer than a tick."""
+
+    def _value(self, *fact: str) -> bool | None:
+        return self._state[fact]
+
+    def _act(self, *action: str) -> Status:
+        changes = happen(self._rng, self._actions[action], self._state)
+        self._state.update(changes)
+        words = {True: "true", False: "false", None: "unknown"}
+        told = ", ".join(f"{in_words(fact)} {words[value]}" for fact, value in changes.items())
+        self._report(f"{in_words(action)}: {told or 'no change'}")
+        return Status.SUCCESS
+
+
+def in_words(fact: Fact) -> str:
+    """``predicate(object,…)``."""
+    return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) -> None:
+    """Run trees in the simulated world as the command line says; ``make`` makes one."""
+    parser = argparse.ArgumentParser(description="Run the tree in a simulated world.")
+    parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default: 0)")
+    parser.add_argument("--runs", type=int, default=1, help="with more than one, count successes")
+    options = parser.parse_args()
+    rng = random.Random(options.seed)
+    if options.runs == 1:
+        status = run(make(rng, print))
+        print(f"The tree returned {status.value}.")
+    else:
+        ends = [run(make(rng, lambda _: None)) for _ in range(options.runs)]
+        print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
+
+
+INITIAL: list[tuple[str, State]] = [
+    (
+        "1",
+        {
+            ("gripper_free",): True,
+            ("holding", "chocolates"): False,
+            ("holding", "wine"): False,
+            ("in_view", "chocolates"): True,
+            ("in_view", "wine"): True,
+            ("lost", "chocolates"): False,
+            ("lost", "wine"): False,
+            ("packed", "chocolates", "crate1"): False,
+            ("packed", "wine", "crate1"): False,
+        },
+    ),
+]
+"""The states a run may start in, with their probabilities."""
+
+
+ACTIONS: dict[Fact, list[Factor]] = {
+    ("look_for", "chocolates"): [
+        [("9/10", Outcome(Effect({("in_view", "chocolates"): True}))), ("1/10", Outcome())],
+    ],
+    ("look_for", "wine"): [
+        [("9/10", Outcome(Effect({("in_view", "wine"): True}))), ("1/10", Outcome())],
+    ],
+    ("pick", "chocolates"): [
+        [("1", Outcome(Effect({("gripper_free",): False, ("holding", "chocolates"): None})))],
+    ],
+    ("pick", "wine"): [
+        [("1", Outcome(Effect({("gripper_free",): False, ("holding", "wine"): None})))],
+    ],
+    ("place", "chocolates", "crate1"): [
+        [
+            (
+                "19/20",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "chocolates"): False,
+                            ("packed", "chocolates", "crate1"): True,
+                        },
+                    ),
+                ),
+            ),
+            (
+                "1/25",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "chocolates"): False,
+                            ("in_view", "chocolates"): False,
+                        },
+                    ),
+                ),
+            ),
+            (
+                "1/100",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "chocolates"): False,
+                            ("in_view", "chocolates"): False,
+                            ("lost", "chocolates"): True,
+                        },
+                    ),
+                ),
+            ),
+        ],
+    ],
+    ("place", "wine", "crate1"): [
+        [
+            (
+                "19/20",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "wine"): False,
+                            ("packed", "wine", "crate1"): True,
+                        },
+                    ),
+                ),
+            ),
+            (
+                "1/25",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "wine"): False,
+                            ("in_view", "wine"): False,
+                        },
+                    ),
+                ),
+            ),
+            (
+                "1/100",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "wine"): False,
+                            ("in_view", "wine"): False,
+                            ("lost", "wine"): True,
+                        },
+                    ),
+                ),
+            ),
+        ],
+    ],
+    ("read_force_sensor", "chocolates"): [
+        [
+            ("3/4", Outcome(Effect({("holding", "chocolates"): True}))),
+            (
+                "1/12",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "chocolates"): False,
+                            ("in_view", "chocolates"): False,
+                        },
+                    ),
+                ),
+            ),
+            (
+                "1/48",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "chocolates"): False,
+                            ("in_view", "chocolates"): False,
+                            ("lost", "chocolates"): True,
+                        },
+                    ),
+                ),
+            ),
+            ("7/48", Outcome(Effect({("gripper_free",): True, ("holding", "chocolates"): False}))),
+        ],
+    ],
+    ("read_force_sensor", "wine"): [
+        [
+            ("3/4", Outcome(Effect({("holding", "wine"): True}))),
+            (
+                "1/12",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "wine"): False,
+                            ("in_view", "wine"): False,
+                        },
+                    ),
+                ),
+            ),
+            (
+                "1/48",
+                Outcome(
+                    Effect(
+                        {
+                            ("gripper_free",): True,
+                            ("holding", "wine"): False,
+                            ("in_view", "wine"): False,
+                            ("lost", "wine"): True,
+                        },
+                    ),
+                ),
+            ),
+            ("7/48", Outcome(Effect({("gripper_free",): True, ("holding", "wine"): False}))),
+        ],
+    ],
+}
+"""What each action does: independent choices between outcomes."""
+
+
+class SimulatedWorld(World):
+    """Plays the robot."""
+
+    def gripper_free(self) -> bool:
+        return self._value("gripper_free") is True
+
+    def holding(self, item: str) -> bool | None:
+        return self._value("holding", item)
+
+    def in_view(self, item: str) -> bool:
+        return self._value("in_view", item) is True
+
+    def lost(self, item: str) -> bool:
+        return self._value("lost", item) is True
+
+    def packed(self, item: str, into: str) -> bool:
+        return self._value("packed", item, into) is True
+
+    def look_for(self, item: str) -> Status:
+        return self._act("look_for", item)
+
+    def pick(self, item: str) -> Status:
+        return self._act("pick", item)
+
+    def place(self, item: str, into: str) -> Status:
+        return self._act("place", item, into)
+
+    def read_force_sensor(self, item: str) -> Status:
+        return self._act("read_force_sensor", item)
+
+
+def main() -> None:
+    """Run the tree in the simulated world."""
+    simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+
+if __name__ == "__main__":
+    main()
