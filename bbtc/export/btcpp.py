@@ -7,7 +7,6 @@ explains every idiom.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -15,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from typing_extensions import assert_never
 
-from bbtc.export.btcpp_conditions import ConditionWriter, control, describe_short
+from bbtc.export.btcpp_conditions import ConditionWriter, control, describe_short, is_numeric
 from bbtc.export.interface import Interface, Leaf, action_symbol, guard_of, interface_of
 from bbtc.export.names import Namer, Symbol, camel, identifiers, port_values, printable
 from bbtc.export.registry import Figures, Option, OptionValue
@@ -39,8 +38,6 @@ RESERVED = frozenset(
     """.split()  # noqa: SIM905 (a list of seventy lines would be no clearer)
 )
 """Ids with a meaning of their own in BehaviorTree.CPP 4 files."""
-
-_NUMBER = re.compile(r"[+-]?(?:[0-9]|\.[0-9]|inf|nan)", re.IGNORECASE)
 
 Guard: TypeAlias = bytes
 """The XML of a guard, which tells guards apart."""
@@ -100,7 +97,9 @@ class _Writer:
         self.action_trees: dict[tuple[str, bytes, Guard | None], Element] = {}
         self.condition_trees: dict[str, Element] = {}
         self.subtree_ports: dict[str, tuple[str, ...]] = {}
-        self.conditions = ConditionWriter(self.task, self.names.interface, self.names.ids, self.names.values)
+        self.conditions = ConditionWriter(
+            self.task, self.names.interface, self.names.ids, self.names.values, self.tree_ids
+        )
 
     def document(self, model: bool) -> Element:
         main_id = self.tree_ids.take(camel(self.tree.task.problem), seed=self.tree.task.problem)
@@ -111,7 +110,11 @@ class _Writer:
         main.append(_until_blocked(guarded))
         document.extend(self.hoisted)
         document.extend(self.condition_trees.values())
+        document.extend(self.conditions.trees.values())
         document.extend(self.action_trees.values())
+        self.subtree_ports |= {
+            tree_id: self.conditions.ports_of(tree_id) for tree_id in self.conditions.trees
+        }
         if model:
             document.append(self._model())
         return document
@@ -170,7 +173,7 @@ class _Writer:
         action = self.task.action_by_name[node.action]
         ports = self._ports(action)
         # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
-        passed = {port: arg for port, arg in ports.items() if not _NUMBER.match(arg)}
+        passed = {port: arg for port, arg in ports.items() if not is_numeric(arg)}
         binding = {arg: port for port, arg in reversed(passed.items())}
         tag = Element(self.names.ids[action_symbol(action)])
         for port, arg in ports.items():

@@ -4,7 +4,7 @@ A literal is a leaf: SUCCESS, FAILURE, RUNNING for true, false, unknown. What is
 
 - ``not p``: Inverter, which keeps RUNNING;
 - ``unknown p``, ``known p``: the leaf with its two other results forced to one, and beside it, in a
-  Skipper, the answer for RUNNING;
+  Skipper, the answer for RUNNING; as a BehaviorTree per predicate;
 - ``and``, ``or`` with at most one part that can be unknown: ReactiveSequence, ReactiveFallback with
   that part last, which are minimum and maximum then;
 - other ``and``, ``or``: a Parallel that succeeds when all (one) and fails when one (all) did, which is
@@ -14,6 +14,7 @@ A literal is a leaf: SUCCESS, FAILURE, RUNNING for true, false, unknown. What is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -22,7 +23,7 @@ from xml.etree.ElementTree import Element, SubElement
 from typing_extensions import assert_never
 
 from bbtc.export.interface import Interface, variable_symbol
-from bbtc.export.names import Symbol, printable
+from bbtc.export.names import Namer, Symbol, printable
 from bbtc.export.shape import can_be_unknown
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.describe import describe
@@ -31,6 +32,7 @@ from bbtc.kleene import Truth
 from bbtc.tree.nodes import ControlKind
 
 _LONGEST_LABEL = 60
+_NUMBER = re.compile(r"[+-]?(?:[0-9]|\.[0-9]|inf|nan)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,16 +64,34 @@ def control(kind: ControlKind, children: Sequence[Element]) -> Element:
     return element
 
 
+def is_numeric(value: str) -> bool:
+    """Whether a value may change its type when it is passed to a SubTree: numbers do from 4.9 on."""
+    return _NUMBER.match(value) is not None
+
+
 class ConditionWriter:
-    """Writes conditions in normal form (:func:`bbtc.export.shape.normal`) of one tree."""
+    """Writes conditions in normal form (:func:`bbtc.export.shape.normal`) of one tree. The
+    BehaviorTrees that they refer to gather in :attr:`trees`, by id."""
 
     def __init__(
-        self, task: Task, interface: Interface, ids: Mapping[Symbol, str], values: Mapping[str, str]
+        self,
+        task: Task,
+        interface: Interface,
+        ids: Mapping[Symbol, str],
+        values: Mapping[str, str],
+        tree_ids: Namer,
     ) -> None:
+        self.trees: dict[str, Element] = {}
         self._task = task
         self._interface = interface
         self._ids = ids
         self._values = values
+        self._tree_ids = tree_ids
+        self._tests: dict[tuple[str, Symbol], str] = {}
+
+    def ports_of(self, tree_id: str) -> tuple[str, ...]:
+        """The ports of a BehaviorTree in :attr:`trees`."""
+        return next(self._parameters(s) for (_, s), known in self._tests.items() if known == tree_id)
 
     def uses_register(self, condition: Condition) -> bool:
         """Whether the condition, or one inside it, is written with a blackboard entry."""
@@ -96,7 +116,9 @@ class ConditionWriter:
             case Is(_, Truth.TRUE) | Constant():
                 pass
             case Is() | Known() | Not() | And() | Or():
-                if not binding:
+                # A SubTree says all in its tag, and its name would have to be unique; a condition
+                # on ports has no words of its own.
+                if not binding and element.tag != "SubTree":
                     element.set("name", describe_short(self._task, condition).short)
             case _:
                 assert_never(condition)
@@ -111,11 +133,9 @@ class ConditionWriter:
             case Is(variable, Truth.FALSE):
                 return _decorated("Inverter", self._leaf(variable, binding))
             case Is(variable, _):
-                forced = _decorated("ForceFailure", self._leaf(variable, binding))
-                return control("skipper", [forced, Element("AlwaysSuccess")])
+                return self._test("Unknown", variable, binding)
             case Known(variable):
-                forced = _decorated("ForceSuccess", self._leaf(variable, binding))
-                return control("skipper", [forced, Element("AlwaysFailure")])
+                return self._test("Known", variable, binding)
             case Not(part):
                 return _decorated("Inverter", self._kleene(part, binding))
             case And(parts):
@@ -146,10 +166,38 @@ class ConditionWriter:
     def _leaf(self, variable: int, binding: Mapping[str, str]) -> Element:
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
-        element = Element(self._ids[symbol])
-        for parameter, arg in zip(self._interface.leaves[symbol].parameters, read.args, strict=True):
+        return self._with_ports(Element(self._ids[symbol]), symbol, read.args, binding)
+
+    def _test(self, kind: Literal["Known", "Unknown"], variable: int, binding: Mapping[str, str]) -> Element:
+        read = self._task.variables[variable]
+        symbol = variable_symbol(read)
+        if any(is_numeric(arg) for arg in read.args):
+            return _test_of(kind, self._leaf(variable, binding))
+        if (kind, symbol) not in self._tests:
+            tree_id = self._tree_ids.take(f"{kind}{self._ids[symbol]}", seed=symbol.name)
+            ports = self._parameters(symbol)
+            leaf = Element(self._ids[symbol], {port: f"{{{port}}}" for port in ports})
+            self.trees[tree_id] = Element("BehaviorTree", ID=tree_id)
+            self.trees[tree_id].append(_test_of(kind, leaf))
+            self._tests[kind, symbol] = tree_id
+        return self._with_ports(Element("SubTree", ID=self._tests[kind, symbol]), symbol, read.args, binding)
+
+    def _with_ports(
+        self, element: Element, symbol: Symbol, args: tuple[str, ...], binding: Mapping[str, str]
+    ) -> Element:
+        for parameter, arg in zip(self._parameters(symbol), args, strict=True):
             element.set(parameter, f"{{{binding[arg]}}}" if arg in binding else self._values[arg])
         return element
+
+    def _parameters(self, symbol: Symbol) -> tuple[str, ...]:
+        return self._interface.leaves[symbol].parameters
+
+
+def _test_of(kind: Literal["Known", "Unknown"], leaf: Element) -> Element:
+    forced, otherwise = (
+        ("ForceSuccess", "AlwaysFailure") if kind == "Known" else ("ForceFailure", "AlwaysSuccess")
+    )
+    return control("skipper", [_decorated(forced, leaf), Element(otherwise)])
 
 
 def _decorated(decorator: str, child: Element) -> Element:
