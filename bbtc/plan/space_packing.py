@@ -1,0 +1,221 @@
+"""Physical states as bits: one bit per variable for "true", one more per three-valued variable for
+"unknown", packed into 64-bit words, and conditions as tests of those bits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from typing_extensions import assert_never
+
+from bbtc.belief.state import Values
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+
+WORD = 64
+Words: TypeAlias = npt.NDArray[np.uint64]
+"""Packed states, a row each."""
+Flags: TypeAlias = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Cube:
+    """A conjunction of bit literals: holds in a state where ``state & mask == value``."""
+
+    mask: int
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class Packing:
+    """Where the bits of each variable stand. ``unknown[v]`` is None for a two-valued variable."""
+
+    unknown: tuple[int | None, ...]
+    words: int
+
+    @classmethod
+    def of(cls, task: Task) -> Packing:
+        """The layout for a task: true bits first, by variable, then the unknown bits."""
+        at = len(task.variables)
+        unknown: list[int | None] = []
+        for variable in task.variables:
+            unknown.append(at if variable.three_valued else None)
+            at += variable.three_valued
+        return cls(tuple(unknown), max(1, -(-at // WORD)))
+
+    def bits(self, variable: int) -> int:
+        """All bits of a variable."""
+        unknown = self.unknown[variable]
+        return 1 << variable | (0 if unknown is None else 1 << unknown)
+
+    def assigned(self, variable: int, value: int) -> int:
+        """The bits of a variable that has a value. Raises ``ValueError`` if it cannot have it."""
+        if value == Truth.TRUE:
+            return 1 << variable
+        if value == Truth.FALSE:
+            return 0
+        unknown = self.unknown[variable]
+        if unknown is None:
+            raise ValueError(f"variable {variable} is two-valued")
+        return 1 << unknown
+
+    def pack(self, values: Values) -> int:
+        """The bits of a state."""
+        packed = 0
+        for variable, value in enumerate(values):
+            packed |= self.assigned(variable, value)
+        return packed
+
+    def split(self, packed: Iterable[int]) -> Words:
+        """Integers of bits as rows of words."""
+        rows = [p.to_bytes(self.words * 8, "little") for p in packed]
+        return np.frombuffer(b"".join(rows), dtype="<u8").astype(np.uint64).reshape(len(rows), self.words)
+
+    def unpack(self, states: Words) -> npt.NDArray[np.uint8]:
+        """The truth value of every variable in each row."""
+        octets = np.ascontiguousarray(states.astype("<u8")).view(np.uint8)
+        bits = np.unpackbits(octets.reshape(len(states), self.words * 8), axis=1, bitorder="little")
+        count = len(self.unknown)
+        values: npt.NDArray[np.uint8] = bits[:, :count] * 2
+        three = [v for v, at in enumerate(self.unknown) if at is not None]
+        if three:
+            values[:, three] += bits[:, [at for at in self.unknown if at is not None]]
+        return values
+
+    def values(self, states: Words, row: int) -> Values:
+        """One state as the rest of the program keeps it."""
+        return bytes(self.unpack(states[row : row + 1])[0].tolist())
+
+
+# --- conditions ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class All:
+    """A conjunction of tests."""
+
+    parts: tuple[BitTest, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Any:
+    """A disjunction of tests."""
+
+    parts: tuple[BitTest, ...]
+
+
+BitTest: TypeAlias = Cube | All | Any
+ALWAYS = Cube(0, 0)
+NEVER = Any(())
+
+
+def bit_test(packing: Packing, condition: Condition, value: bool = True) -> BitTest:
+    """When the Kleene value of a condition is true (false with ``value`` False), as a test."""
+    match condition:
+        case Is(variable, Truth.UNKNOWN):
+            return _is_unknown(packing, variable, value)
+        case Known(variable):
+            return _is_unknown(packing, variable, not value)
+        case Is(variable, wanted):
+            true = value == (wanted is Truth.TRUE)
+            return Cube(packing.bits(variable), 1 << variable if true else 0)
+        case And(parts) if value:
+            return _all(bit_test(packing, part, True) for part in parts)
+        case Or(parts) if not value:
+            return _all(bit_test(packing, part, False) for part in parts)
+        case And(parts) | Or(parts):
+            return _any([bit_test(packing, part, value) for part in parts])
+        case Not(part):
+            return bit_test(packing, part, not value)
+        case Constant(constant):
+            return ALWAYS if constant == value else NEVER
+        case _:
+            assert_never(condition)
+
+
+def _is_unknown(packing: Packing, variable: int, value: bool) -> BitTest:
+    at = packing.unknown[variable]
+    if at is None:
+        return NEVER if value else ALWAYS
+    return Cube(1 << at, 1 << at if value else 0)
+
+
+def _all(parts: Iterable[BitTest]) -> BitTest:
+    mask = bits = 0
+    rest: list[BitTest] = []
+    for part in parts:
+        if part == NEVER:
+            return NEVER
+        if isinstance(part, Cube):
+            if (bits ^ part.value) & mask & part.mask:
+                return NEVER
+            mask, bits = mask | part.mask, bits | part.value
+        else:
+            rest.append(part)
+    if not rest:
+        return Cube(mask, bits)
+    return All((*([Cube(mask, bits)] if mask else []), *rest))
+
+
+def _any(parts: Sequence[BitTest]) -> BitTest:
+    if ALWAYS in parts:
+        return ALWAYS
+    kept = tuple(dict.fromkeys(part for part in parts if part != NEVER))
+    return kept[0] if len(kept) == 1 else Any(kept)
+
+
+def cubes(test: BitTest, most: int) -> list[Cube] | None:
+    """The test as a disjunction of cubes; None if that takes more than ``most`` of them."""
+    match test:
+        case Cube():
+            return [test]
+        case Any(parts):
+            found: dict[Cube, None] = {}
+            for part in parts:
+                inner = cubes(part, most)
+                if inner is None:
+                    return None
+                found.update(dict.fromkeys(inner))
+            return list(found) if len(found) <= most else None
+        case All(parts):
+            product = [ALWAYS]
+            for part in parts:
+                inner = cubes(part, most)
+                if inner is None:
+                    return None
+                joined = [_all((a, b)) for a in product for b in inner]
+                product = list(dict.fromkeys(cube for cube in joined if isinstance(cube, Cube)))
+                if len(product) > most:
+                    return None
+            return product
+        case _:
+            assert_never(test)
+
+
+def holds(packing: Packing, test: BitTest, states: Words) -> Flags:
+    """In which rows the test holds."""
+    match test:
+        case Cube(mask, value):
+            found = np.ones(len(states), dtype=np.bool_)
+            for word in range(packing.words):
+                part = mask >> word * WORD & (1 << WORD) - 1
+                if part:
+                    bits = np.uint64(value >> word * WORD & (1 << WORD) - 1)
+                    found &= (states[:, word] & np.uint64(part)) == bits
+            return found
+        case All(parts):
+            found = np.ones(len(states), dtype=np.bool_)
+            for inner in parts:
+                found &= holds(packing, inner, states)
+            return found
+        case Any(parts):
+            found = np.zeros(len(states), dtype=np.bool_)
+            for inner in parts:
+                found |= holds(packing, inner, states)
+            return found
+        case _:
+            assert_never(test)

@@ -1,0 +1,159 @@
+"""The state space in arrays is the one that the simulator's actions span."""
+
+from __future__ import annotations
+
+import dataclasses
+from fractions import Fraction
+
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bbtc.belief.state import Values, compile_action, initial_belief
+from bbtc.ground.condition import TRUE, Is, evaluate
+from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.plan import space_actions, space_packing
+from bbtc.plan.space import StateSpace, explore_space
+from bbtc.plan.space_table import StateTable
+from tests.strategies import tasks
+
+Step = tuple[str, Values, Fraction, Fraction]
+"""Action, values after it, cost, reward."""
+
+
+def by_simulator(task: Task) -> dict[Values, dict[Step, Fraction]]:
+    """Reachable states and the results of every choice that may leave its state."""
+    steps = {action.name: compile_action(action) for action in task.actions}
+    found: dict[Values, dict[Step, Fraction]] = {}
+    todo = list(initial_belief(task))
+    while todo:
+        values = todo.pop()
+        if values in found:
+            continue
+        found[values] = {}
+        if evaluate(task.goal, values) is Truth.TRUE:
+            continue
+        for action in task.actions:
+            if evaluate(action.precondition, values) is not Truth.TRUE:
+                continue
+            results = steps[action.name](values)
+            if all(result.values == values for result in results):
+                continue
+            for r in results:
+                key = (action.name, r.values, r.cost, r.reward)
+                found[values][key] = found[values].get(key, Fraction(0)) + r.probability
+                todo.append(r.values)
+    return found
+
+
+def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
+    found: dict[Values, dict[Step, Fraction]] = {}
+    values = [space.packing.values(space.states, row) for row in range(len(space.states))]
+    for state, before in enumerate(values):
+        assert before not in found, "a state stands twice"
+        found[before] = {}
+        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
+            for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
+                draw = space.draws[space.edge_draw[edge]]
+                key = (space.action_name(choice), values[space.edge_target[edge]], draw.cost, draw.reward)
+                found[before][key] = found[before].get(key, Fraction(0)) + draw.probability
+    return found
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@given(task=tasks(nested=2))
+def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> None:
+    space = explore_space(task, Limits())
+    assert space.complete
+    assert by_arrays(space) == by_simulator(task)
+    initial = {space.packing.values(space.states, s): p for p, s in space.initial}
+    assert initial == initial_belief(task)
+    for row, holds in enumerate(space.goal):
+        values = space.packing.values(space.states, row)
+        assert holds == (evaluate(task.goal, values) is Truth.TRUE)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@given(task=tasks(nested=2))
+def test_actions_with_very_many_outcomes_and_disjuncts_take_another_way_to_the_same(task: Task) -> None:
+    before = space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES
+    space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES = 1, 1
+    try:
+        space = explore_space(task, Limits())
+    finally:
+        space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES = before
+    assert by_arrays(space) == by_simulator(task)
+
+
+def lamps(count: int) -> Task:
+    """Any lamp can be switched on; over 64 of them take more than one word."""
+    switches = tuple(
+        GroundAction(
+            "switch", (f"{i:03}",), Is(i, Truth.FALSE), (Factor((Outcome(Fraction(1), (_on(i),)),)),)
+        )
+        for i in range(count)
+    )
+    variables = tuple(Variable("lit", (f"{i:03}",), three_valued=i % 2 == 0) for i in range(count))
+    start = tuple(Truth.TRUE if i < count - 3 else Truth.FALSE for i in range(count))
+    last = Is(count - 1, Truth.TRUE)
+    return Task("lamps", "all", variables, (InitialState(Fraction(1), start),), last, switches)
+
+
+def _on(variable: int) -> Effect:
+    return Effect(None, ((variable, Truth.TRUE),))
+
+
+def test_states_of_several_words() -> None:
+    space = explore_space(lamps(150), Limits())
+    assert space.packing.words == 4
+    # The last lamp ends it: the subsets of the two others, with and without it.
+    assert (len(space.states), int(space.goal.sum())) == (8, 4)
+    assert by_arrays(space) == by_simulator(space.task)
+
+
+def test_a_depth_leaves_the_rest_unexpanded() -> None:
+    task = dataclasses.replace(lamps(70), goal=Is(0, Truth.FALSE))
+    assert explore_space(task, Limits(), depth=1).levels == (0, 1)
+    space = explore_space(task, Limits(), depth=2)
+    assert (space.levels, space.expanded, len(space.states)) == ((0, 1, 4), 4, 7)
+    assert not space.complete
+    assert space.stop is None
+
+
+def test_a_limit_leaves_the_rest_unexpanded_and_is_named() -> None:
+    task = dataclasses.replace(lamps(70), goal=Is(0, Truth.FALSE))
+    space = explore_space(task, Limits(states=3))
+    assert not space.complete
+    assert space.stop is not None
+    assert "3 states" in space.stop.message
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    rows=st.lists(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), max_size=40), max_size=20),
+    bits=st.sampled_from([0, 3, 62]),
+)
+def test_the_table_numbers_states_as_they_first_appear(rows: list[list[tuple[int, int]]], bits: int) -> None:
+    table = StateTable(2)
+    known: dict[tuple[int, int], int] = {}
+    for batch in rows:
+        packed = [(a << bits, b << bits) for a, b in batch]
+        expected = [known.setdefault(row, len(known)) for row in packed]
+        assert table.number(np.array(packed, dtype=np.uint64).reshape(-1, 2)).tolist() == expected
+    assert [tuple(row) for row in table.states.tolist()] == list(known)
+
+
+def test_the_table_grows() -> None:
+    table = StateTable(1)
+    first = np.arange(5000, dtype=np.uint64).reshape(-1, 1) << np.uint64(40)
+    assert (table.number(first) == np.arange(5000)).all()
+    assert (table.number(first[::-1]) == np.arange(5000)[::-1]).all()
+    assert table.count == 5000
+
+
+def test_conditions_of_any_shape_become_cubes() -> None:
+    packing = space_packing.Packing((2, None), 1)
+    assert space_packing.bit_test(packing, TRUE) == space_packing.ALWAYS
+    assert space_packing.bit_test(packing, Is(1, Truth.UNKNOWN)) == space_packing.NEVER
