@@ -79,7 +79,7 @@ class _Writer:
         nodes = {"Condition", "Action", "Latch", "StopWhenBlocked", "run", *self.conditions.used, *composites}
         if "skipper" in composites:
             nodes.add("Skipper")
-        simulation = ["Effect", "Outcome", "Factor", "draw", "happen", "World", "in_words", "simulate"]
+        simulation = ["When", "Outcome", "Factor", "draw", "happen", "World", "in_words", "simulate"]
         blocks = [
             self._protocol(),
             *runtime_source("pytrees_nodes", nodes),

@@ -82,25 +82,20 @@ class WorldWriter:
         return _tuple((variable.predicate, *variable.args))
 
     def _factors(self, factors: tuple[Factor, ...]) -> Code:
-        return sequence(
-            sequence(call("", _probability(o.probability), self._outcome(o)) for o in factor.outcomes)
-            for factor in factors
-        )
+        return sequence(sequence(map(self._outcome, factor.outcomes)) for factor in factors)
 
     def _outcome(self, outcome: Outcome) -> Code:
-        items: list[Code] = []
+        always: dict[int, Truth] = {}
+        conditional: list[Code] = []
         for effect in outcome.effects:
             when = TRUE if effect.when is None else normal(self._task, effect.when)
-            if when == FALSE or not effect.sets:
-                continue
-            # Where one effect sets a variable twice, the Kleene maximum wins, as between effects.
-            united: dict[int, Truth] = {}
-            for index, value in effect.sets:
-                united[index] = max(value, united.get(index, Truth.FALSE))
-            parts: list[Code] = [self._state(united.items())]
-            if when != TRUE:
-                parts.append(Prefixed("when=lambda s: ", self._conditions.write(when, self._read)))
-            items.append(call("Effect", *parts))
+            changes: dict[int, Truth] = always if when == TRUE else {}
+            for index, value in effect.sets:  # the Kleene maximum wins
+                changes[index] = max(value, changes.get(index, Truth.FALSE))
+            if when not in (TRUE, FALSE) and changes:
+                condition = Prefixed("lambda s: ", self._conditions.write(when, self._read))
+                conditional.append(call("When", condition, self._state(changes.items())))
+        items = [_probability(outcome.probability), self._state(always.items()), *conditional]
         if outcome.factors:
             items.append(Prefixed("then=", self._factors(outcome.factors)))
         return call("Outcome", *items)

@@ -151,7 +151,7 @@ def known_names() -> set[str]:
 
 _ALL = [
     *("all_of", "any_of", "negated", "Condition", "Action", "Latch", "Skipper", "sequence", "fallback"),
-    *("skipper", "StopWhenBlocked", "run", "Fact", "State", "T", "Effect", "Outcome", "Factor", "draw"),
+    *("skipper", "StopWhenBlocked", "run", "Fact", "State", "T", "When", "Outcome", "Factor", "draw"),
     *("happen", "World", "in_words", "simulate"),
 ]
 

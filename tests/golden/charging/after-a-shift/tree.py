@@ -367,23 +367,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -404,10 +409,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -498,48 +502,33 @@ INITIAL: list[tuple[str, State]] = [
 ACTIONS: dict[Fact, list[Factor]] = {
     ("charge",): [
         [
-            (
+            Outcome(
                 "1",
-                Outcome(
-                    Effect(
-                        {
-                            ("battery", "full"): True,
-                            ("battery", "half"): False,
-                            ("battery", "low"): False,
-                        },
-                    ),
-                ),
+                {("battery", "full"): True, ("battery", "half"): False, ("battery", "low"): False},
             ),
         ],
     ],
     ("check_charger",): [
-        [
-            ("3/5", Outcome(Effect({("docked",): True}))),
-            ("2/5", Outcome(Effect({("docked",): False}))),
-        ],
+        [Outcome("3/5", {("docked",): True}), Outcome("2/5", {("docked",): False})],
     ],
-    ("dock", "station"): [[("1", Outcome(Effect({("docked",): None})))]],
+    ("dock", "station"): [[Outcome("1", {("docked",): None})]],
     ("drive", "lobby"): [
         [
-            (
+            Outcome(
                 "1",
-                Outcome(
-                    Effect({("at", "lobby"): True, ("at", "station"): False, ("docked",): False}),
-                    Effect(
-                        {("battery", "full"): False, ("battery", "half"): True},
-                        when=lambda s: s[("battery", "full")],
-                    ),
-                    Effect(
-                        {("battery", "half"): False, ("battery", "low"): True},
-                        when=lambda s: s[("battery", "half")],
-                    ),
+                {("at", "lobby"): True, ("at", "station"): False, ("docked",): False},
+                When(
+                    lambda s: s[("battery", "full")],
+                    {("battery", "full"): False, ("battery", "half"): True},
+                ),
+                When(
+                    lambda s: s[("battery", "half")],
+                    {("battery", "half"): False, ("battery", "low"): True},
                 ),
             ),
         ],
     ],
-    ("scan", "lobby"): [
-        [("9/10", Outcome(Effect({("patrolled", "lobby"): True}))), ("1/10", Outcome())],
-    ],
+    ("scan", "lobby"): [[Outcome("9/10", {("patrolled", "lobby"): True}), Outcome("1/10", {})]],
 }
 """What each action does: independent choices between outcomes."""
 

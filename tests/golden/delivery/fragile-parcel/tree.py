@@ -355,23 +355,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -392,10 +397,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -473,30 +477,21 @@ INITIAL: list[tuple[str, State]] = [
 ACTIONS: dict[Fact, list[Factor]] = {
     ("go_to", "desk7"): [
         [
-            ("19/20", Outcome(Effect({("at", "desk7"): True, ("at", "reception"): False}))),
-            ("1/20", Outcome()),
+            Outcome("19/20", {("at", "desk7"): True, ("at", "reception"): False}),
+            Outcome("1/20", {}),
         ],
     ],
     ("hand_over", "vase", "ben", "desk7"): [
         [
-            (
-                "49/50",
-                Outcome(Effect({("carrying", "vase"): False, ("handed", "vase", "ben"): True})),
-            ),
-            ("1/50", Outcome()),
+            Outcome("49/50", {("carrying", "vase"): False, ("handed", "vase", "ben"): True}),
+            Outcome("1/50", {}),
         ],
     ],
     ("knock", "ben", "desk7"): [
-        [
-            ("7/10", Outcome(Effect({("present", "ben"): True}))),
-            ("3/10", Outcome(Effect({("present", "ben"): False}))),
-        ],
+        [Outcome("7/10", {("present", "ben"): True}), Outcome("3/10", {("present", "ben"): False})],
     ],
     ("phone", "ben"): [
-        [
-            ("2/5", Outcome(Effect({("present", "ben"): True}))),
-            ("3/5", Outcome(Effect({("voicemail", "ben"): True}))),
-        ],
+        [Outcome("2/5", {("present", "ben"): True}), Outcome("3/5", {("voicemail", "ben"): True})],
     ],
 }
 """What each action does: independent choices between outcomes."""

@@ -329,23 +329,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -366,10 +371,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -448,44 +452,35 @@ INITIAL: list[tuple[str, State]] = [
 ACTIONS: dict[Fact, list[Factor]] = {
     ("go_to", "reception"): [
         [
-            ("19/20", Outcome(Effect({("at", "desk12"): False, ("at", "reception"): True}))),
-            ("1/20", Outcome()),
+            Outcome("19/20", {("at", "desk12"): False, ("at", "reception"): True}),
+            Outcome("1/20", {}),
         ],
     ],
     ("hand_over", "invoice", "anna", "desk12"): [
         [
-            (
-                "49/50",
-                Outcome(
-                    Effect({("carrying", "invoice"): False, ("handed", "invoice", "anna"): True}),
-                ),
-            ),
-            ("1/50", Outcome()),
+            Outcome("49/50", {("carrying", "invoice"): False, ("handed", "invoice", "anna"): True}),
+            Outcome("1/50", {}),
         ],
     ],
     ("knock", "anna", "desk12"): [
         [
-            ("7/10", Outcome(Effect({("present", "anna"): True}))),
-            ("3/10", Outcome(Effect({("present", "anna"): False}))),
+            Outcome("7/10", {("present", "anna"): True}),
+            Outcome("3/10", {("present", "anna"): False}),
         ],
     ],
     ("leave", "invoice", "reception"): [
         [
-            (
+            Outcome(
                 "9/10",
-                Outcome(
-                    Effect(
-                        {("carrying", "invoice"): False, ("left", "invoice", "reception"): True},
-                    ),
-                ),
+                {("carrying", "invoice"): False, ("left", "invoice", "reception"): True},
             ),
-            ("1/10", Outcome()),
+            Outcome("1/10", {}),
         ],
     ],
     ("phone", "anna"): [
         [
-            ("2/5", Outcome(Effect({("present", "anna"): True}))),
-            ("3/5", Outcome(Effect({("voicemail", "anna"): True}))),
+            Outcome("2/5", {("present", "anna"): True}),
+            Outcome("3/5", {("voicemail", "anna"): True}),
         ],
     ],
 }

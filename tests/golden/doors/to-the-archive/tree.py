@@ -279,23 +279,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -316,10 +321,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -395,31 +399,21 @@ INITIAL: list[tuple[str, State]] = [
 
 ACTIONS: dict[Fact, list[Factor]] = {
     ("go_through", "archive_door", "hall", "archive"): [
-        [("1", Outcome(Effect({("in", "archive"): True, ("in", "hall"): False})))],
+        [Outcome("1", {("in", "archive"): True, ("in", "hall"): False})],
     ],
     ("take_key", "archive_key", "hall"): [
-        [("19/20", Outcome(Effect({("holding", "archive_key"): True}))), ("1/20", Outcome())],
+        [Outcome("19/20", {("holding", "archive_key"): True}), Outcome("1/20", {})],
     ],
     ("try_handle", "archive_door", "hall"): [
         [
-            (
-                "3/5",
-                Outcome(
-                    Effect({("locked", "archive_door"): False, ("open", "archive_door"): True}),
-                ),
-            ),
-            ("2/5", Outcome(Effect({("locked", "archive_door"): True}))),
+            Outcome("3/5", {("locked", "archive_door"): False, ("open", "archive_door"): True}),
+            Outcome("2/5", {("locked", "archive_door"): True}),
         ],
     ],
     ("unlock", "archive_door", "archive_key", "hall"): [
         [
-            (
-                "9/10",
-                Outcome(
-                    Effect({("locked", "archive_door"): False, ("open", "archive_door"): True}),
-                ),
-            ),
-            ("1/10", Outcome()),
+            Outcome("9/10", {("locked", "archive_door"): False, ("open", "archive_door"): True}),
+            Outcome("1/10", {}),
         ],
     ],
 }

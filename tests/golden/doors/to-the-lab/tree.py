@@ -361,23 +361,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -398,10 +403,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -480,42 +484,32 @@ INITIAL: list[tuple[str, State]] = [
 ACTIONS: dict[Fact, list[Factor]] = {
     ("call_control_room", "corridor_door"): [
         [
-            (
-                "1/3",
-                Outcome(
-                    Effect({("locked", "corridor_door"): False, ("open", "corridor_door"): True}),
-                ),
-            ),
-            ("2/3", Outcome()),
+            Outcome("1/3", {("locked", "corridor_door"): False, ("open", "corridor_door"): True}),
+            Outcome("2/3", {}),
         ],
     ],
     ("call_control_room", "lab_door"): [
         [
-            ("1/3", Outcome(Effect({("locked", "lab_door"): False, ("open", "lab_door"): True}))),
-            ("2/3", Outcome()),
+            Outcome("1/3", {("locked", "lab_door"): False, ("open", "lab_door"): True}),
+            Outcome("2/3", {}),
         ],
     ],
     ("go_through", "corridor_door", "hall", "corridor"): [
-        [("1", Outcome(Effect({("in", "corridor"): True, ("in", "hall"): False})))],
+        [Outcome("1", {("in", "corridor"): True, ("in", "hall"): False})],
     ],
     ("go_through", "lab_door", "corridor", "lab"): [
-        [("1", Outcome(Effect({("in", "corridor"): False, ("in", "lab"): True})))],
+        [Outcome("1", {("in", "corridor"): False, ("in", "lab"): True})],
     ],
     ("try_handle", "corridor_door", "hall"): [
         [
-            (
-                "3/5",
-                Outcome(
-                    Effect({("locked", "corridor_door"): False, ("open", "corridor_door"): True}),
-                ),
-            ),
-            ("2/5", Outcome(Effect({("locked", "corridor_door"): True}))),
+            Outcome("3/5", {("locked", "corridor_door"): False, ("open", "corridor_door"): True}),
+            Outcome("2/5", {("locked", "corridor_door"): True}),
         ],
     ],
     ("try_handle", "lab_door", "corridor"): [
         [
-            ("3/5", Outcome(Effect({("locked", "lab_door"): False, ("open", "lab_door"): True}))),
-            ("2/5", Outcome(Effect({("locked", "lab_door"): True}))),
+            Outcome("3/5", {("locked", "lab_door"): False, ("open", "lab_door"): True}),
+            Outcome("2/5", {("locked", "lab_door"): True}),
         ],
     ],
 }

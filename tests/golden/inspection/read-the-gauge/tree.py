@@ -285,23 +285,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -322,10 +327,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -402,19 +406,19 @@ INITIAL: list[tuple[str, State]] = [
 
 ACTIONS: dict[Fact, list[Factor]] = {
     ("drive", "boiler_room"): [
-        [("1", Outcome(Effect({("at", "boiler_room"): True, ("at", "pump_hall"): False})))],
+        [Outcome("1", {("at", "boiler_room"): True, ("at", "pump_hall"): False})],
     ],
     ("drive", "pump_hall"): [
-        [("1", Outcome(Effect({("at", "boiler_room"): False, ("at", "pump_hall"): True})))],
+        [Outcome("1", {("at", "boiler_room"): False, ("at", "pump_hall"): True})],
     ],
     ("read_gauge", "pressure", "boiler_room"): [
         [
-            ("19/20", Outcome(Effect({("in_range", "pressure"): True}))),
-            ("1/20", Outcome(Effect({("in_range", "pressure"): False}))),
+            Outcome("19/20", {("in_range", "pressure"): True}),
+            Outcome("1/20", {("in_range", "pressure"): False}),
         ],
     ],
-    ("switch_torch_on",): [[("1", Outcome(Effect({("torch_on",): True})))]],
-    ("wipe_lens",): [[("1", Outcome(Effect({("lens_clean",): True})))]],
+    ("switch_torch_on",): [[Outcome("1", {("torch_on",): True})]],
+    ("wipe_lens",): [[Outcome("1", {("lens_clean",): True})]],
 }
 """What each action does: independent choices between outcomes."""
 

@@ -318,23 +318,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -355,10 +360,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -435,70 +439,46 @@ INITIAL: list[tuple[str, State]] = [
 
 
 ACTIONS: dict[Fact, list[Factor]] = {
-    ("drive", "cellar"): [
-        [("1", Outcome(Effect({("at", "cellar"): True, ("at", "pump_hall"): False})))],
-    ],
+    ("drive", "cellar"): [[Outcome("1", {("at", "cellar"): True, ("at", "pump_hall"): False})]],
     ("look_at_valve", "drain", "cellar"): [
         [
-            (
-                "2/3",
-                Outcome(Effect({("closed", "drain"): True}, when=lambda s: s[("lens_clean",)])),
-            ),
-            (
-                "1/3",
-                Outcome(Effect({("closed", "drain"): False}, when=lambda s: s[("lens_clean",)])),
-            ),
+            Outcome("2/3", {}, When(lambda s: s[("lens_clean",)], {("closed", "drain"): True})),
+            Outcome("1/3", {}, When(lambda s: s[("lens_clean",)], {("closed", "drain"): False})),
         ],
         [
-            (
+            Outcome(
                 "1/2",
-                Outcome(
-                    Effect({("closed", "drain"): True}, when=lambda s: negated(s[("lens_clean",)])),
-                ),
+                {},
+                When(lambda s: negated(s[("lens_clean",)]), {("closed", "drain"): True}),
             ),
-            (
+            Outcome(
                 "1/4",
-                Outcome(
-                    Effect(
-                        {("closed", "drain"): False},
-                        when=lambda s: negated(s[("lens_clean",)]),
-                    ),
-                ),
+                {},
+                When(lambda s: negated(s[("lens_clean",)]), {("closed", "drain"): False}),
             ),
-            ("1/4", Outcome()),
+            Outcome("1/4", {}),
         ],
     ],
     ("look_at_valve", "inlet", "pump_hall"): [
         [
-            (
-                "2/3",
-                Outcome(Effect({("closed", "inlet"): True}, when=lambda s: s[("lens_clean",)])),
-            ),
-            (
-                "1/3",
-                Outcome(Effect({("closed", "inlet"): False}, when=lambda s: s[("lens_clean",)])),
-            ),
+            Outcome("2/3", {}, When(lambda s: s[("lens_clean",)], {("closed", "inlet"): True})),
+            Outcome("1/3", {}, When(lambda s: s[("lens_clean",)], {("closed", "inlet"): False})),
         ],
         [
-            (
+            Outcome(
                 "1/2",
-                Outcome(
-                    Effect({("closed", "inlet"): True}, when=lambda s: negated(s[("lens_clean",)])),
-                ),
+                {},
+                When(lambda s: negated(s[("lens_clean",)]), {("closed", "inlet"): True}),
             ),
-            (
+            Outcome(
                 "1/4",
-                Outcome(
-                    Effect(
-                        {("closed", "inlet"): False},
-                        when=lambda s: negated(s[("lens_clean",)]),
-                    ),
-                ),
+                {},
+                When(lambda s: negated(s[("lens_clean",)]), {("closed", "inlet"): False}),
             ),
-            ("1/4", Outcome()),
+            Outcome("1/4", {}),
         ],
     ],
-    ("switch_torch_on",): [[("1", Outcome(Effect({("torch_on",): True})))]],
+    ("switch_torch_on",): [[Outcome("1", {("torch_on",): True})]],
 }
 """What each action does: independent choices between outcomes."""
 

@@ -606,23 +606,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -643,10 +648,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -726,159 +730,107 @@ INITIAL: list[tuple[str, State]] = [
 
 ACTIONS: dict[Fact, list[Factor]] = {
     ("look_for", "chocolates"): [
-        [("9/10", Outcome(Effect({("in_view", "chocolates"): True}))), ("1/10", Outcome())],
+        [Outcome("9/10", {("in_view", "chocolates"): True}), Outcome("1/10", {})],
     ],
-    ("look_for", "wine"): [
-        [("9/10", Outcome(Effect({("in_view", "wine"): True}))), ("1/10", Outcome())],
-    ],
+    ("look_for", "wine"): [[Outcome("9/10", {("in_view", "wine"): True}), Outcome("1/10", {})]],
     ("pick", "chocolates"): [
-        [("1", Outcome(Effect({("gripper_free",): False, ("holding", "chocolates"): None})))],
+        [Outcome("1", {("gripper_free",): False, ("holding", "chocolates"): None})],
     ],
-    ("pick", "wine"): [
-        [("1", Outcome(Effect({("gripper_free",): False, ("holding", "wine"): None})))],
-    ],
+    ("pick", "wine"): [[Outcome("1", {("gripper_free",): False, ("holding", "wine"): None})]],
     ("place", "chocolates", "crate1"): [
         [
-            (
+            Outcome(
                 "19/20",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "chocolates"): False,
-                            ("packed", "chocolates", "crate1"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "chocolates"): False,
+                    ("packed", "chocolates", "crate1"): True,
+                },
             ),
-            (
+            Outcome(
                 "1/25",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "chocolates"): False,
-                            ("in_view", "chocolates"): False,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "chocolates"): False,
+                    ("in_view", "chocolates"): False,
+                },
             ),
-            (
+            Outcome(
                 "1/100",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "chocolates"): False,
-                            ("in_view", "chocolates"): False,
-                            ("lost", "chocolates"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "chocolates"): False,
+                    ("in_view", "chocolates"): False,
+                    ("lost", "chocolates"): True,
+                },
             ),
         ],
     ],
     ("place", "wine", "crate1"): [
         [
-            (
+            Outcome(
                 "19/20",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "wine"): False,
-                            ("packed", "wine", "crate1"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "wine"): False,
+                    ("packed", "wine", "crate1"): True,
+                },
             ),
-            (
+            Outcome(
                 "1/25",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "wine"): False,
-                            ("in_view", "wine"): False,
-                        },
-                    ),
-                ),
+                {("gripper_free",): True, ("holding", "wine"): False, ("in_view", "wine"): False},
             ),
-            (
+            Outcome(
                 "1/100",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "wine"): False,
-                            ("in_view", "wine"): False,
-                            ("lost", "wine"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "wine"): False,
+                    ("in_view", "wine"): False,
+                    ("lost", "wine"): True,
+                },
             ),
         ],
     ],
     ("read_force_sensor", "chocolates"): [
         [
-            ("3/4", Outcome(Effect({("holding", "chocolates"): True}))),
-            (
+            Outcome("3/4", {("holding", "chocolates"): True}),
+            Outcome(
                 "1/12",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "chocolates"): False,
-                            ("in_view", "chocolates"): False,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "chocolates"): False,
+                    ("in_view", "chocolates"): False,
+                },
             ),
-            (
+            Outcome(
                 "1/48",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "chocolates"): False,
-                            ("in_view", "chocolates"): False,
-                            ("lost", "chocolates"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "chocolates"): False,
+                    ("in_view", "chocolates"): False,
+                    ("lost", "chocolates"): True,
+                },
             ),
-            ("7/48", Outcome(Effect({("gripper_free",): True, ("holding", "chocolates"): False}))),
+            Outcome("7/48", {("gripper_free",): True, ("holding", "chocolates"): False}),
         ],
     ],
     ("read_force_sensor", "wine"): [
         [
-            ("3/4", Outcome(Effect({("holding", "wine"): True}))),
-            (
+            Outcome("3/4", {("holding", "wine"): True}),
+            Outcome(
                 "1/12",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "wine"): False,
-                            ("in_view", "wine"): False,
-                        },
-                    ),
-                ),
+                {("gripper_free",): True, ("holding", "wine"): False, ("in_view", "wine"): False},
             ),
-            (
+            Outcome(
                 "1/48",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "wine"): False,
-                            ("in_view", "wine"): False,
-                            ("lost", "wine"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "wine"): False,
+                    ("in_view", "wine"): False,
+                    ("lost", "wine"): True,
+                },
             ),
-            ("7/48", Outcome(Effect({("gripper_free",): True, ("holding", "wine"): False}))),
+            Outcome("7/48", {("gripper_free",): True, ("holding", "wine"): False}),
         ],
     ],
 }

@@ -404,23 +404,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -441,10 +446,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -519,82 +523,50 @@ INITIAL: list[tuple[str, State]] = [
 
 
 ACTIONS: dict[Fact, list[Factor]] = {
-    ("look_for", "water"): [
-        [("9/10", Outcome(Effect({("in_view", "water"): True}))), ("1/10", Outcome())],
-    ],
-    ("pick", "water"): [
-        [("1", Outcome(Effect({("gripper_free",): False, ("holding", "water"): None})))],
-    ],
+    ("look_for", "water"): [[Outcome("9/10", {("in_view", "water"): True}), Outcome("1/10", {})]],
+    ("pick", "water"): [[Outcome("1", {("gripper_free",): False, ("holding", "water"): None})]],
     ("place", "water", "tray1"): [
         [
-            (
+            Outcome(
                 "19/20",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "water"): False,
-                            ("packed", "water", "tray1"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "water"): False,
+                    ("packed", "water", "tray1"): True,
+                },
             ),
-            (
+            Outcome(
                 "1/25",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "water"): False,
-                            ("in_view", "water"): False,
-                        },
-                    ),
-                ),
+                {("gripper_free",): True, ("holding", "water"): False, ("in_view", "water"): False},
             ),
-            (
+            Outcome(
                 "1/100",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "water"): False,
-                            ("in_view", "water"): False,
-                            ("lost", "water"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "water"): False,
+                    ("in_view", "water"): False,
+                    ("lost", "water"): True,
+                },
             ),
         ],
     ],
     ("read_force_sensor", "water"): [
         [
-            ("3/4", Outcome(Effect({("holding", "water"): True}))),
-            (
+            Outcome("3/4", {("holding", "water"): True}),
+            Outcome(
                 "1/12",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "water"): False,
-                            ("in_view", "water"): False,
-                        },
-                    ),
-                ),
+                {("gripper_free",): True, ("holding", "water"): False, ("in_view", "water"): False},
             ),
-            (
+            Outcome(
                 "1/48",
-                Outcome(
-                    Effect(
-                        {
-                            ("gripper_free",): True,
-                            ("holding", "water"): False,
-                            ("in_view", "water"): False,
-                            ("lost", "water"): True,
-                        },
-                    ),
-                ),
+                {
+                    ("gripper_free",): True,
+                    ("holding", "water"): False,
+                    ("in_view", "water"): False,
+                    ("lost", "water"): True,
+                },
             ),
-            ("7/48", Outcome(Effect({("gripper_free",): True, ("holding", "water"): False}))),
+            Outcome("7/48", {("gripper_free",): True, ("holding", "water"): False}),
         ],
     ],
 }

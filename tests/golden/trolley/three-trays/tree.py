@@ -252,23 +252,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -289,10 +294,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -374,98 +378,68 @@ INITIAL: list[tuple[str, State]] = [
 
 ACTIONS: dict[Fact, list[Factor]] = {
     ("push", "ward"): [
-        [("1", Outcome(Effect({("trolley_at", "kitchen"): False, ("trolley_at", "ward"): True})))],
+        [Outcome("1", {("trolley_at", "kitchen"): False, ("trolley_at", "ward"): True})],
         [
-            (
+            Outcome(
                 "1/40",
-                Outcome(
-                    Effect(
-                        {("on", "tray1"): False, ("spilled", "tray1"): True},
-                        when=lambda s: all_of(
-                            s[("on", "tray1")],
-                            negated(s[("strapped", "tray1")]),
-                        ),
-                    ),
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray1")], negated(s[("strapped", "tray1")])),
+                    {("on", "tray1"): False, ("spilled", "tray1"): True},
                 ),
             ),
-            (
+            Outcome(
                 "3/40",
-                Outcome(
-                    Effect(
-                        {("on", "tray1"): False},
-                        when=lambda s: all_of(
-                            s[("on", "tray1")],
-                            negated(s[("strapped", "tray1")]),
-                        ),
-                    ),
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray1")], negated(s[("strapped", "tray1")])),
+                    {("on", "tray1"): False},
                 ),
             ),
-            ("9/10", Outcome()),
+            Outcome("9/10", {}),
         ],
         [
-            (
+            Outcome(
                 "1/40",
-                Outcome(
-                    Effect(
-                        {("on", "tray2"): False, ("spilled", "tray2"): True},
-                        when=lambda s: all_of(
-                            s[("on", "tray2")],
-                            negated(s[("strapped", "tray2")]),
-                        ),
-                    ),
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray2")], negated(s[("strapped", "tray2")])),
+                    {("on", "tray2"): False, ("spilled", "tray2"): True},
                 ),
             ),
-            (
+            Outcome(
                 "3/40",
-                Outcome(
-                    Effect(
-                        {("on", "tray2"): False},
-                        when=lambda s: all_of(
-                            s[("on", "tray2")],
-                            negated(s[("strapped", "tray2")]),
-                        ),
-                    ),
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray2")], negated(s[("strapped", "tray2")])),
+                    {("on", "tray2"): False},
                 ),
             ),
-            ("9/10", Outcome()),
+            Outcome("9/10", {}),
         ],
         [
-            (
+            Outcome(
                 "1/40",
-                Outcome(
-                    Effect(
-                        {("on", "tray3"): False, ("spilled", "tray3"): True},
-                        when=lambda s: all_of(
-                            s[("on", "tray3")],
-                            negated(s[("strapped", "tray3")]),
-                        ),
-                    ),
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray3")], negated(s[("strapped", "tray3")])),
+                    {("on", "tray3"): False, ("spilled", "tray3"): True},
                 ),
             ),
-            (
+            Outcome(
                 "3/40",
-                Outcome(
-                    Effect(
-                        {("on", "tray3"): False},
-                        when=lambda s: all_of(
-                            s[("on", "tray3")],
-                            negated(s[("strapped", "tray3")]),
-                        ),
-                    ),
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray3")], negated(s[("strapped", "tray3")])),
+                    {("on", "tray3"): False},
                 ),
             ),
-            ("9/10", Outcome()),
+            Outcome("9/10", {}),
         ],
     ],
-    ("put_back", "tray1"): [
-        [("4/5", Outcome(Effect({("on", "tray1"): True}))), ("1/5", Outcome())],
-    ],
-    ("put_back", "tray2"): [
-        [("4/5", Outcome(Effect({("on", "tray2"): True}))), ("1/5", Outcome())],
-    ],
-    ("put_back", "tray3"): [
-        [("4/5", Outcome(Effect({("on", "tray3"): True}))), ("1/5", Outcome())],
-    ],
+    ("put_back", "tray1"): [[Outcome("4/5", {("on", "tray1"): True}), Outcome("1/5", {})]],
+    ("put_back", "tray2"): [[Outcome("4/5", {("on", "tray2"): True}), Outcome("1/5", {})]],
+    ("put_back", "tray3"): [[Outcome("4/5", {("on", "tray3"): True}), Outcome("1/5", {})]],
 }
 """What each action does: independent choices between outcomes."""
 

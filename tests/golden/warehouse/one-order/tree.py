@@ -533,23 +533,28 @@ State = dict[Fact, bool | None]
 T = TypeVar("T")
 
 
-class Effect:
-    """Changes that happen if ``when`` is True in the state before the action."""
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
 
-    def __init__(self, changes: State, when: Callable[[State], bool | None] | None = None) -> None:
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
         self.changes = changes
-        self.when = when
 
 
 class Outcome:
-    """Effects of one thing that may happen, and independent choices that follow if it does."""
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
 
-    def __init__(self, *effects: Effect, then: list[Factor] | None = None) -> None:
-        self.effects = effects
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
         self.then = then or []
 
 
-Factor = list[tuple[str, Outcome]]
+Factor = list[Outcome]
 
 
 def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
@@ -570,10 +575,9 @@ def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
     changes: State = {}
     strength = {False: 0, None: 1, True: 2}
     for factor in factors:
-        outcome = draw(rng, factor)
-        drawn = [e.changes for e in outcome.effects if e.when is None or e.when(before)]
-        drawn.append(happen(rng, outcome.then, before))
-        for part in drawn:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
             for fact, value in part.items():
                 if fact not in changes or strength[value] > strength[changes[fact]]:
                     changes[fact] = value
@@ -651,71 +655,44 @@ INITIAL: list[tuple[str, State]] = [
 
 ACTIONS: dict[Fact, list[Factor]] = {
     ("drive", "a1"): [
-        [
-            (
-                "1",
-                Outcome(
-                    Effect({("at", "a1"): True, ("at", "a2"): False, ("at", "packing"): False}),
-                ),
-            ),
-        ],
+        [Outcome("1", {("at", "a1"): True, ("at", "a2"): False, ("at", "packing"): False})],
     ],
     ("drive", "a2"): [
-        [
-            (
-                "1",
-                Outcome(
-                    Effect({("at", "a1"): False, ("at", "a2"): True, ("at", "packing"): False}),
-                ),
-            ),
-        ],
+        [Outcome("1", {("at", "a1"): False, ("at", "a2"): True, ("at", "packing"): False})],
     ],
     ("drive", "packing"): [
-        [
-            (
-                "1",
-                Outcome(
-                    Effect({("at", "a1"): False, ("at", "a2"): False, ("at", "packing"): True}),
-                ),
-            ),
-        ],
+        [Outcome("1", {("at", "a1"): False, ("at", "a2"): False, ("at", "packing"): True})],
     ],
     ("fetch", "drill", "a1"): [
         [
-            (
-                "9/10",
-                Outcome(Effect({("loaded", "drill"): True, ("stored", "drill", "a1"): False})),
-            ),
-            ("1/10", Outcome()),
+            Outcome("9/10", {("loaded", "drill"): True, ("stored", "drill", "a1"): False}),
+            Outcome("1/10", {}),
         ],
     ],
     ("fetch", "drill", "a2"): [
         [
-            (
-                "9/10",
-                Outcome(Effect({("loaded", "drill"): True, ("stored", "drill", "a2"): False})),
-            ),
-            ("1/10", Outcome()),
+            Outcome("9/10", {("loaded", "drill"): True, ("stored", "drill", "a2"): False}),
+            Outcome("1/10", {}),
         ],
     ],
     ("hand_in", "drill", "packing"): [
         [
-            ("1/2", Outcome(Effect({("delivered", "drill"): True, ("loaded", "drill"): False}))),
-            ("1/2", Outcome()),
+            Outcome("1/2", {("delivered", "drill"): True, ("loaded", "drill"): False}),
+            Outcome("1/2", {}),
         ],
     ],
     ("scan", "drill", "a1"): [
         [
-            ("7/10", Outcome(Effect({("stored", "drill", "a1"): True}))),
-            ("1/5", Outcome(Effect({("stored", "drill", "a1"): False}))),
-            ("1/10", Outcome()),
+            Outcome("7/10", {("stored", "drill", "a1"): True}),
+            Outcome("1/5", {("stored", "drill", "a1"): False}),
+            Outcome("1/10", {}),
         ],
     ],
     ("scan", "drill", "a2"): [
         [
-            ("7/10", Outcome(Effect({("stored", "drill", "a2"): True}))),
-            ("1/5", Outcome(Effect({("stored", "drill", "a2"): False}))),
-            ("1/10", Outcome()),
+            Outcome("7/10", {("stored", "drill", "a2"): True}),
+            Outcome("1/5", {("stored", "drill", "a2"): False}),
+            Outcome("1/10", {}),
         ],
     ],
 }
