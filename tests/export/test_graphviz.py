@@ -184,6 +184,14 @@ def test_graphviz_reads_back_every_text_whatever_the_names(tree: Tree, expand: b
     assert sorted(edges) == sorted(parents)
 
 
+@pytest.mark.parametrize("name", ["<b>bold</b>", "<>", "<", "&lt;", "\\N", "\\", '"', "a\\", '\\"'])
+def test_graphviz_takes_a_name_for_what_it_is(name: str) -> None:
+    tree = soda_tree()
+    root = ControlNode("n1", "sequence", (ConditionNode("n2", tree.task.goal),), template=name)
+    nodes, _ = read_dot(str(export(replace(tree, root=root), "dot", {"templates": "collapsed"})))
+    assert nodes["n1"].lines == [name]
+
+
 @settings(deadline=None)
 @given(trees(HOSTILE_NAMES))
 def test_our_svg_is_well_formed_whatever_the_names(tree: Tree) -> None:
@@ -313,14 +321,15 @@ def test_the_layout_is_tidy(forest: tuple[list[Box], list[int | None]]) -> None:
             assert all(layout.y[b] - boxes[b].height / 2 > layout.y[a] + boxes[a].height / 2 for b in below)
 
 
-def test_equal_leaves_stand_at_equal_distances() -> None:
-    boxes = [Box(20, 20)] * 8
-    # A wide first and last subtree, three small ones between them.
-    layout = tidy(boxes, [None, 0, 1, 1, 0, 0, 0, 0], _GAP, 30.0)
-    steps = [layout.x[b] - layout.x[a] for a, b in [(1, 4), (4, 5), (5, 6), (6, 7)]]
-    assert steps == pytest.approx([30.0] * 4)
-    mirrored = tidy(boxes, [None, 0, 0, 2, 2, 0, 0, 0], _GAP, 30.0)
-    assert mirrored.width == pytest.approx(5 * 20 + 4 * _GAP)
+def test_a_small_subtree_stands_in_the_middle_of_the_room_its_neighbours_leave() -> None:
+    # The root's first and last child have three children each, which keep them apart; two leaves between.
+    parents = [None, 0, 1, 1, 1, 0, 0, 0, 7, 7, 7]
+    layout = tidy([Box(20, 20)] * len(parents), parents, _GAP, 30.0)
+    first, second, third, last = (layout.x[number] for number in (1, 5, 6, 7))
+    assert last - first == pytest.approx(3 * 30)
+    assert third - second == pytest.approx(30)
+    alone = tidy([Box(20, 20)] * 10, [*parents[:6], 0, 6, 6, 6], _GAP, 30.0)
+    assert alone.x[5] == pytest.approx(alone.x[0])
 
 
 def test_a_very_deep_tree_is_drawn() -> None:
