@@ -17,6 +17,9 @@ from bbtc.syntax.scan import Fault, blank
 
 # A parenthesis with the word after it, or a field.
 _MARK = re.compile(r"\(\s*([^\s()?]*)|\)|(?<![^\s()]):[a-z-]+", re.IGNORECASE | re.ASCII)
+_INDENT = re.compile(r"[ \t]*")
+MAX_FAULTS = 100
+"""With more than these, the text is not PDDL with a slip."""
 _SECTIONS = frozenset(
     (
         *(":requirements", ":types", ":constants", ":predicates", ":functions"),
@@ -47,6 +50,11 @@ class Opener(NamedTuple):
         return f"`({self.word}`"
 
 
+def _under(opener: Opener, indent: str) -> bool:
+    """Does an indentation line up with an opener, or with its line?"""
+    return indent == opener.indent or (len(indent) == opener.column and not indent.strip(" "))
+
+
 class Extra(NamedTuple):
     """A closing parenthesis too many, and the last section before it."""
 
@@ -71,6 +79,10 @@ class Balance:
     _closed_section: Opener | None = None
     _section_end: int = 0
     _broken: bool = False
+    _line: tuple[int, int, str] = (0, -1, "")
+    """Start and end of the current line, and its indentation."""
+    _surplus_run: bool = False
+    """The last mark was a closing parenthesis too many."""
     _surplus: int = 0
 
     def run(self) -> Balance:
@@ -79,16 +91,26 @@ class Balance:
         self._edited = bytearray(text, "ascii")
         for match in _MARK.finditer(text):
             start = match.start()
+            if start > self._line[1]:
+                self._line = self._line_around(start)
             if text[start] == ")":
                 self._close(start)
             elif text[start] == "(":
                 self._open(start, match[1].lower())
             else:
                 self._field(start, match.group().lower())
+            if len(self.faults) > MAX_FAULTS:
+                return self
         if self._stack:
             self._end()
         self.text = self._edited.decode("ascii")
         return self
+
+    def _line_around(self, at: int) -> tuple[int, int, str]:
+        start = self.text.rfind("\n", 0, at) + 1
+        end = self.text.find("\n", at)
+        indent = _INDENT.match(self.text, start)
+        return start, end if end >= 0 else len(self.text), indent.group() if indent else ""
 
     def _open(self, start: int, word: str) -> None:
         stack = self._stack
@@ -108,9 +130,8 @@ class Balance:
             stack.append(self._closed)
         if len(stack) == 1:
             self._section, self._suspect, self._broken = start, None, False
-        line = self.text.rfind("\n", 0, start) + 1
-        before = self.text[line:start]
-        stack.append(Opener(start, word, before[: len(before) - len(before.lstrip())], len(before)))
+        self._surplus_run = False
+        stack.append(Opener(start, word, self._line[2], start - self._line[0]))
 
     def _misplaced_section(self, start: int, word: str) -> None:
         outer = self._stack[1]
@@ -139,17 +160,16 @@ class Balance:
             blank(self._edited, start, start + 1)
             if self._surplus:
                 self._surplus -= 1
-            elif not self.extras or self.text[self.extras[-1].start + 1 : start].strip(") \t\r\n"):
+            elif not self._surplus_run:
                 self._extra(start, "closes nothing")
+            self._surplus_run = True
             return
         opener = self._stack.pop()
-        line = self.text.rfind("\n", 0, start) + 1
-        before = self.text[line:start]
-        aligned = before in (opener.indent, " " * opener.column)
-        if self._suspect is None and not before.strip() and not aligned and len(self._stack) > 0:
-            outer = [o for o in self._stack if before in (o.indent, " " * o.column)]
-            if outer and opener.start < line:
-                self._suspect = opener
+        line, _, indent = self._line
+        # Does the first parenthesis of a line stand under another opener than the one it closes?
+        leads = start == line + len(indent) and opener.start < line and not _under(opener, indent)
+        if leads and self._suspect is None and any(_under(outer, indent) for outer in self._stack):
+            self._suspect = opener
         if len(self._stack) == 1:
             self._closed_section, self._section_end = opener, start
             if self._broken:

@@ -317,7 +317,7 @@ class Builder:
         return ast.Metric(way, expression, between(head, close))
 
     def facts(self, children: list[Any]) -> list[ast.InitElement]:
-        return list(leaves.facts(children[0]))
+        return leaves.facts(children[0])
 
     def fluent_value(self, children: list[Any]) -> ast.FluentValue | ast.Unsupported:
         head, left, right, close = children

@@ -42,6 +42,8 @@ class Production(NamedTuple):
     """Name of the builder's method; None for a list to be laid open."""
     single: bool
     """A single child stands for the whole (``?rule``)."""
+    grows: bool
+    """A list rule of the form ``list: list item``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,9 @@ class Tables:
     """Regular expression of each terminal, in the order in which they are tried."""
 
 
+# What completing a production does to the stack of values.
+_CALL, _SINGLE, _APPEND = range(3)
+_Reduction: TypeAlias = tuple[int, str, tuple[int, ...], Callable[[list[Any]], Any] | None, int]
 _Scanner: TypeAlias = Callable[[str, int], "re.Match[str] | None"]
 
 
@@ -111,9 +116,9 @@ def _production(rule: Mapping[str, Any]) -> Production:
     splice = tuple(at for at, name in enumerate(expansion) if name.startswith("_"))
     alias = rule["alias"]
     single = bool(rule["options"]["expand1"]) and len(expansion) == 1 and alias is None and not splice
-    return Production(
-        origin, len(expansion), splice, None if origin.startswith("_") else alias or origin, single
-    )
+    call = None if origin.startswith("_") else alias or origin
+    grows = call is None and splice == (0,) and len(expansion) == 2 and expansion[0] == origin
+    return Production(origin, len(expansion), splice, call, single, grows)
 
 
 class Engine:
@@ -127,16 +132,7 @@ class Engine:
         self._start, self._end = tables.start, tables.end
         self._actions = tables.actions
         self._goto = tables.goto
-        self._reductions = [
-            (
-                p.size,
-                p.origin,
-                p.splice,
-                getattr(builder, p.call) if p.call and not p.single else None,
-                p.single,
-            )
-            for p in tables.productions
-        ]
+        self._reductions = [_reduction(production, builder) for production in tables.productions]
         self.terminals = tables.terminals
         self._scanners: dict[int, _Scanner] = {}
         self._compiled: dict[frozenset[str], _Scanner] = {}
@@ -153,7 +149,8 @@ class Engine:
             match = (scanners.get(state) or self._scanner(state))(text, position)
             if match is not None:
                 kind: Any = match.lastgroup
-                token = make(Token, (kind, match[kind], *match.span(kind)))
+                first, last = match.span(match.lastindex or 0)
+                token = make(Token, (kind, text[first:last], first, last))
             elif position == len(text):
                 kind, token = END, None
             else:
@@ -164,18 +161,24 @@ class Engine:
                     raise Unexpected(position, states)
                 if action >= 0:
                     break
-                size, origin, splice, call, single = reductions[-1 - action]
-                if single:
+                size, origin, splice, call, shape = reductions[-1 - action]
+                if shape == _APPEND:
+                    # `list: list item` leaves the stack as it was before the item.
                     del states[-1]
-                else:
-                    if size:
-                        children = values[-size:]
-                        del states[-size:], values[-size:]
-                        if splice:
-                            children = _laid_open(children, splice)
-                    else:
-                        children = []
+                    value = values.pop()
+                    values[-1].append(value)
+                    state = states[-1]
+                    continue
+                if shape == _SINGLE:
+                    del states[-1]
+                elif size:
+                    children = values[-size:]
+                    del states[-size:], values[-size:]
+                    if splice:
+                        children = _laid_open(children, splice)
                     values.append(children if call is None else call(children))
+                else:
+                    values.append([] if call is None else call([]))
                 state = goto[states[-1]][origin]
                 states.append(state)
                 if state == end and kind == END:
@@ -216,15 +219,20 @@ class Engine:
         return self._compiled[kinds]
 
 
+def _reduction(production: Production, builder: object) -> _Reduction:
+    origin, size, splice, call, single, grows = production
+    if single:
+        return size, origin, splice, None, _SINGLE
+    if call is not None:
+        return size, origin, splice, getattr(builder, call), _CALL
+    return size, origin, splice, None, _APPEND if grows else _CALL
+
+
 def _laid_open(children: list[Any], splice: tuple[int, ...]) -> list[Any]:
     """The children, with the lists among them replaced by their items."""
-    if splice == (0,):
-        # A list rule is left-recursive: its list grows in place.
-        found: list[Any] = children[0]
-        found.extend(children[1:])
-        return found
-    found = []
-    for at, child in enumerate(children):
+    # A list rule is left-recursive: its list grows in place.
+    found: list[Any] = children[0] if splice[0] == 0 else [children[0]]
+    for at, child in enumerate(children[1:], 1):
         if at in splice:
             found.extend(child)
         else:

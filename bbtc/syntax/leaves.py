@@ -14,7 +14,18 @@ from typing import Any
 
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
-from bbtc.syntax.ast import Assign, Atom, FluentRef, FluentValue, Name, Number, Term, TypedGroup, Variable
+from bbtc.syntax.ast import (
+    Assign,
+    Atom,
+    FluentRef,
+    FluentValue,
+    InitElement,
+    Name,
+    Number,
+    Term,
+    TypedGroup,
+    Variable,
+)
 from bbtc.syntax.engine import Token
 from bbtc.syntax.scan import without_comments
 
@@ -38,7 +49,8 @@ _assign_atom, _assign_value, _assign_span = (_setter(Assign, s) for s in ("atom"
 _WORD = re.compile(r"\??[^\s()?]+")
 _GROUP = re.compile(r"([^\s-].*?)\s+-\s*(\S+)", re.DOTALL)
 _TOKEN = re.compile(r"[()]|[^\s()]+")
-_FACT = re.compile(r"\(([^()]*)\)|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
+# A fact whose words stand one space apart, any fact, or the value of a fluent.
+_FACT = re.compile(r"\(([^\s()]+(?: [^\s()]+)*)\)|(\([^()]*\))|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
 
 NUMBER_LENGTH = 200
 """Longest number, in characters."""
@@ -146,19 +158,41 @@ def assign(fact: Atom, value: Truth, span: Span) -> Assign:
     return node
 
 
-def facts(run: Token) -> Iterator[Assign | FluentValue]:
+def facts(run: Token) -> list[InitElement]:
     """The elements of a run of ground facts ``(p a)`` and values ``(= (f a) 3)``."""
     source, base, true = SOURCE.get(), run.start, Truth.TRUE
+    plain = "?" not in run.text
+    found: list[InitElement] = []
     for match in _FACT.finditer(run.text):
-        span = _tuple(Span, (source, base + match.start(), base + match.end()))
-        inner = match[1]
-        if inner is not None:
-            yield assign(_flat(inner, span), true, span)
-            continue
-        at = Span(source, base + match.start(2), base + match.end(2))
-        head = _flat(match[2][1:-1], at)
-        value = number(match[3], Span(source, base + match.start(3), base + match.end(3)))
-        yield FluentValue(FluentRef(head.predicate, head.args, at), value, span)
+        start, end = match.span()
+        span = _tuple(Span, (source, base + start, base + end))
+        if match[1] is not None and plain:
+            words: list[Any] = []
+            at = base + start + 1
+            for word in match[1].split(" "):
+                stop = at + len(word)
+                node = _new(Name)
+                _name_text(node, word)
+                _name_span(node, _tuple(Span, (source, at, stop)))
+                words.append(node)
+                at = stop + 1
+            fact = _new(Atom)
+            _atom_predicate(fact, words[0])
+            _atom_args(fact, tuple(words[1:]))
+            _atom_span(fact, span)
+            node = _new(Assign)
+            _assign_atom(node, fact)
+            _assign_value(node, true)
+            _assign_span(node, span)
+            found.append(node)
+        elif match[4] is None:
+            found.append(assign(_flat(match.group()[1:-1], span), true, span))
+        else:
+            at = base + match.start(3)
+            head = _flat(match[3][1:-1], Span(source, at, base + match.end(3)))
+            value = number(match[4], Span(source, base + match.start(4), base + match.end(4)))
+            found.append(FluentValue(FluentRef(head.predicate, head.args, head.span), value, span))
+    return found
 
 
 def groups(run: Token) -> Iterator[TypedGroup]:

@@ -73,4 +73,7 @@ def foreign_characters(text: str) -> tuple[list[Fault], str]:
 
 def blank(text: bytearray, start: int, end: int) -> None:
     """Write spaces over everything in a range but line ends."""
+    if end == start + 1 and text[start : start + 1] not in b"\r\n":
+        text[start] = 0x20
+        return
     text[start:end] = re.sub(rb"[^\r\n]", b" ", bytes(text[start:end]))
