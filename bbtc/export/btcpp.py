@@ -14,11 +14,11 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from typing_extensions import assert_never
 
-from bbtc.export.btcpp_conditions import ConditionWriter, control, describe_short, is_numeric
+from bbtc.export.btcpp_conditions import ConditionWriter, control, is_numeric
 from bbtc.export.interface import Interface, Leaf, action_symbol, guard_of, interface_of
 from bbtc.export.names import Namer, Symbol, camel, identifiers, port_values, printable
 from bbtc.export.registry import Figures, Option, OptionValue
-from bbtc.export.shape import fit, normal
+from bbtc.export.shape import fit, normal, words_of
 from bbtc.ground.task import GroundAction, Task
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 
@@ -158,7 +158,7 @@ class _Writer:
             if node.name:
                 element.set("name", printable(node.name))
             return element
-        words = describe_short(self.task, condition)
+        words = words_of(self.task, condition)
         key = words.full
         if key not in self.condition_trees:
             tree_id = self.tree_ids.take(camel(words.short), seed=words.full)

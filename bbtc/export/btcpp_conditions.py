@@ -16,37 +16,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 from xml.etree.ElementTree import Element, SubElement
 
 from typing_extensions import assert_never
 
 from bbtc.export.interface import Interface, variable_symbol
-from bbtc.export.names import Namer, Symbol, printable
-from bbtc.export.shape import can_be_unknown
+from bbtc.export.names import Namer, Symbol
+from bbtc.export.shape import can_be_unknown, words_of
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ControlKind
 
-_LONGEST_LABEL = 60
 _NUMBER = re.compile(r"[+-]?(?:[0-9]|\.[0-9]|inf|nan)", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class Words:
-    """A condition in words: in full, and cut to the length of a label."""
-
-    full: str
-    short: str
-
-
-def describe_short(task: Task, condition: Condition) -> Words:
-    """The condition in words, printable."""
-    full = printable(describe(task, condition))
-    return Words(full, full if len(full) <= _LONGEST_LABEL else full[: _LONGEST_LABEL - 1] + "…")
 
 
 def control(kind: ControlKind, children: Sequence[Element]) -> Element:
@@ -119,7 +102,7 @@ class ConditionWriter:
                 # A SubTree says all in its tag, and its name would have to be unique; a condition
                 # on ports has no words of its own.
                 if not binding and element.tag != "SubTree":
-                    element.set("name", describe_short(self._task, condition).short)
+                    element.set("name", words_of(self._task, condition).short)
             case _:
                 assert_never(condition)
         return element

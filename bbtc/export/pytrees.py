@@ -17,9 +17,8 @@ from bbtc.export.pycode import Code, Group, Prefixed, call, layout, literal
 from bbtc.export.pytrees_parts import ConditionCode, method_parameters, runtime_source
 from bbtc.export.pytrees_world import WorldWriter
 from bbtc.export.registry import Figures, Option, OptionValue
-from bbtc.export.shape import fit, normal
+from bbtc.export.shape import fit, normal, words_of
 from bbtc.ground.condition import Condition
-from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 
@@ -132,7 +131,7 @@ class _Writer:
                 return call(node.kind, literal(_label(node)), *children)
             case ConditionNode():
                 condition = normal(self.task, node.condition)
-                label = node.name or describe(self.task, condition)
+                label = node.name or words_of(self.task, condition).short
                 return call("Condition", literal(printable(label)), self._test(condition))
             case ActionNode():
                 return self._action(node)

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 from bbtc.diagnostics import BbtcError
 from bbtc.tree.nodes import Tree
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 GROUP = "bbtc.exporters"
 
@@ -143,6 +145,8 @@ def _parse_value(format_name: str, option: Option, text: str) -> OptionValue:
 
 
 def _plugins() -> list[EntryPoint]:
+    from importlib.metadata import entry_points
+
     return list(entry_points(group=GROUP))
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import BbtcError
+from bbtc.export.names import printable
 from bbtc.ground.condition import (
     FALSE,
     TRUE,
@@ -21,6 +22,7 @@ from bbtc.ground.condition import (
     disjunction,
     negation,
 )
+from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
@@ -28,6 +30,8 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 DEEPEST_TREE = 250
 """Levels of nodes an exported tree may have: BehaviorTree.CPP reads 256 levels of XML, and py_trees
 needs a Python frame or two a level."""
+
+_LONGEST_LABEL = 60
 
 DEEPEST_CONDITION = 50
 """Levels of ``and``, ``or`` and ``not`` an exported condition may have."""
@@ -110,6 +114,20 @@ def _normal(task: Task, condition: Condition) -> Condition:
             return _normal(task, negation(part))
         case _:
             assert_never(condition)
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """A condition in words, printable: in full, and cut to the length of a label."""
+
+    full: str
+    short: str
+
+
+def words_of(task: Task, condition: Condition) -> Words:
+    """A condition in words."""
+    full = printable(describe(task, condition))
+    return Words(full, full if len(full) <= _LONGEST_LABEL else full[: _LONGEST_LABEL - 1] + "…")
 
 
 def can_be_unknown(task: Task, condition: Condition) -> bool:

@@ -15,15 +15,15 @@ from hypothesis import HealthCheck, given, settings
 from bbtc.diagnostics import BbtcError
 from bbtc.export.btcpp import RESERVED
 from bbtc.export.registry import load_exporter, parse_options
-from bbtc.export.shape import DEEPEST_TREE
+from bbtc.export.shape import DEEPEST_CONDITION, DEEPEST_TREE
 from bbtc.ground.condition import TRUE, And, Condition, Is, Known, Not, Or
 from bbtc.ground.task import GroundAction, InitialState, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from tests.conftest import Golden
-from tests.replay.engines import BtcppReplay
+from tests.replay.engines import BtcppReplay, PyTreesReplay
 from tests.replay.random_trees import random_tree
-from tests.replay.reference import random_run, varied_runs
+from tests.replay.reference import STATUS, random_run, value_of, varied_runs
 from tests.replay.script import TIMINGS, Run, Script
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
@@ -168,8 +168,6 @@ def test_a_condition_has_its_kleene_value_in_every_state_and_after_every_other(c
     tree = tree_of(root, *variables, actions=(GroundAction("go", (), TRUE, ()),))
     replay = BtcppReplay(tree)
     states = [(p, q, r) for p in (0, 1, 2) for q in (0, 1, 2) for r in (0, 2)]
-    from tests.replay.reference import STATUS, value_of
-
     for first in states:
         for second in states:
             status = STATUS[value_of(condition, first)]
@@ -216,6 +214,20 @@ def test_a_condition_too_deep_to_write_is_an_error() -> None:
     with pytest.raises(BbtcError) as error:
         export(tree_of(ConditionNode("n1", condition), Variable("p", (), True)))
     assert error.value.diagnostics[0].code == "BBT0705"
+
+
+def test_the_deepest_condition_that_is_taken_keeps_its_value() -> None:
+    pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
+    condition: Condition = Is(0, Truth.TRUE)
+    for level in range(DEEPEST_CONDITION - 1):
+        part = Is(1, Truth.TRUE if level % 3 else Truth.FALSE)
+        condition = Or((part, condition)) if level % 2 else And((part, condition))
+    variables = Variable("p", (), True), Variable("q", (), True)
+    tree = tree_of(ConditionNode("n1", condition), *variables)
+    for replay in (BtcppReplay(tree), PyTreesReplay(tree)):
+        for values in ((p, q) for p in range(3) for q in range(3)):
+            expected = "success" if value_of(condition, values) == "T" else "failure"
+            assert replay.run(Script(values, ())).status == expected
 
 
 def test_a_subtree_cut_out_for_its_depth_behaves_as_in_place() -> None:

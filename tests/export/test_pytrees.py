@@ -271,7 +271,8 @@ def test_the_simulated_world_has_exactly_the_distribution_of_the_task(seed: int)
         before = tuple(rng.choice(variable.values) for variable in task.variables)
         state = {fact: {2: True, 1: None, 0: False}[before[i]] for i, fact in enumerate(facts)}
 
-        outcomes = module.ACTIONS[(action.schema, *action.args)]
+        fact = (action.schema, *action.args)
+        outcomes = module.ACTIONS[fact]
 
         def after(
             draws: AllDraws, outcomes: object = outcomes, state: dict[tuple[str, ...], bool | None] = state
