@@ -1,0 +1,264 @@
+"""The value of a task: the best any policy can do, without end, within a budget, at least cost."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from fractions import Fraction
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+
+from bbtc.belief.state import Values
+from bbtc.diagnostics import BbtcError, LimitReached
+from bbtc.ground.condition import Is
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.plan import value as value_module
+from bbtc.plan.space import explore_space
+from bbtc.plan.value import Reachability, best_probability, reachability
+from bbtc.plan.value_cost import least_cost
+from bbtc.plan.value_exact import solve
+from bbtc.plan.value_horizon import horizon_values
+from tests.plan.examples import Optimum, cases, corpus_optima
+from tests.plan.test_refine import action, task
+from tests.plan.test_space import by_simulator
+from tests.strategies import tasks
+
+T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
+
+
+def solved(of: Task) -> Reachability:
+    return reachability(explore_space(of, Limits()), Limits())
+
+
+# --- known optima ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", cases(), ids=lambda c: c.name)
+def test_cases_have_their_listed_values(case: Optimum) -> None:
+    space = explore_space(case.task(), Limits())
+    best = reachability(space, Limits()).initial.exact
+    assert best is not None
+    assert float(best) == pytest.approx(case.best, abs=1e-9)
+    within = horizon_values(space, 12, Limits())
+    assert within.exact
+    for budget, expected in case.within:
+        # The list is rounded to six places.
+        assert float(within.initial[budget].lower) == pytest.approx(expected, abs=6e-7)
+
+
+@pytest.mark.parametrize("problem", corpus_optima(), ids=lambda c: c.name)
+def test_public_problems_have_their_listed_values(problem: Optimum) -> None:
+    try:
+        of = problem.task()
+    except BbtcError as error:
+        pytest.skip(f"does not load: {error.diagnostics[0].message}")
+    start = time.monotonic()
+    space = explore_space(of, Limits())
+    bounds = reachability(space, Limits()).initial
+    assert time.monotonic() - start < 10
+    assert float(bounds.lower) == pytest.approx(problem.best, abs=1e-6)
+    assert float(bounds.upper) == pytest.approx(problem.best, abs=1e-6)
+    within = horizon_values(space, 16, Limits())
+    for budget, expected in problem.within:
+        assert float(within.initial[budget].lower) == pytest.approx(expected, abs=1.01e-6)
+        assert float(within.initial[budget].upper) == pytest.approx(expected, abs=1.01e-6)
+
+
+# --- against the definition ------------------------------------------------------------------
+
+Choices = dict[Values, dict[str, dict[Values, Fraction]]]
+
+
+def choices_of(of: Task) -> Choices:
+    """By state and action, the probabilities of the states after it: from the simulator's actions."""
+    found: Choices = {}
+    for values, results in by_simulator(of).items():
+        found[values] = {}
+        for (name, after, _, _), p in results.items():
+            row = found[values].setdefault(name, {})
+            row[after] = row.get(after, Fraction(0)) + p
+    return found
+
+
+def expectation(row: dict[Values, Fraction], value: dict[Values, Fraction]) -> Fraction:
+    return sum((p * value[t] for t, p in row.items()), Fraction(0))
+
+
+def after_steps(of: Task, choices: Choices, steps: int) -> dict[Values, Fraction]:
+    """The best probability of having reached the goal within some steps, by recursion."""
+    from bbtc.ground.condition import evaluate
+
+    value = {s: Fraction(evaluate(of.goal, s) is T) for s in choices}
+    for _ in range(steps):
+        value = {
+            s: max([value[s], *(expectation(row, value) for row in choices[s].values())]) for s in choices
+        }
+    return value
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks())
+def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task) -> None:
+    """A value that a policy attains and that solves the optimality inequalities is P*."""
+    found = solved(of)
+    space, graph = found.space, found.graph
+    assert found.initial.exact is not None
+    values = [found.bounds(s).lower for s in range(graph.states)]
+    policy_rows: list[dict[int, Fraction]] = []
+    wins: list[Fraction] = []
+    for state in range(graph.states):
+        rows: dict[int, dict[int, Fraction]] = {}
+        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
+            row = rows.setdefault(choice, {})
+            for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
+                p = space.draws[space.edge_draw[edge]].probability
+                target = int(space.edge_target[edge])
+                row[target] = row.get(target, Fraction(0)) + p
+            expected = sum(p * values[t] for t, p in row.items())
+            assert expected <= values[state]
+            assert bool(found.best[choice]) == (values[state] > 0 and expected == values[state])
+        if space.goal[state]:
+            assert values[state] == 1
+        chosen = {} if found.policy[state] < 0 else rows[int(found.policy[state])]
+        wins.append(sum((p for t, p in chosen.items() if space.goal[t]), Fraction(0)))
+        policy_rows.append({t: p for t, p in chosen.items() if not space.goal[t]})
+    # Every state with positive value has a way to the goal, so the chain leaves all of its loops.
+    positive = [s for s in range(graph.states) if values[s] and not space.goal[s]]
+    number = {s: i for i, s in enumerate(positive)}
+    rows_of = [{number[t]: p for t, p in policy_rows[s].items() if t in number} for s in positive]
+    assert solve(rows_of, [wins[s] for s in positive]) == [values[s] for s in positive]
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks())
+def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Task) -> None:
+    choices = choices_of(of)
+    space = explore_space(of, Limits())
+    within = horizon_values(space, 8, Limits())
+    values = [space.packing.values(space.states, s) for s in range(len(space.states))]
+    for steps in (0, 1, 3, 8):
+        expected = after_steps(of, choices, steps)
+        assert list(within.values[steps]) == [expected[v] for v in values]
+    best = reachability(space, Limits()).initial.exact
+    assert best is not None
+    assert all(a.lower <= b.lower for a, b in itertools.pairwise(within.initial))
+    assert within.initial[8].lower <= best
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks())
+def test_bounds_from_floats_hold_the_exact_values(of: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = solved(of)
+    space = exact.space
+    with monkeypatch.context() as patch:
+        patch.setattr(value_module, "_MOST_EXACT", -1)
+        floats = reachability(space, Limits())
+        patch.setattr("bbtc.plan.value_horizon._MOST_EXACT", -1)
+        horizon = horizon_values(space, 5, Limits()) if len(space.edge_target) else None
+    for state in range(len(space.states)):
+        known, close = exact.bounds(state), floats.bounds(state)
+        assert close.lower <= known.lower <= close.upper
+        assert close.upper - close.lower < 1e-8
+    if horizon is not None:
+        known_horizon = horizon_values(space, 5, Limits())
+        for a, b in zip(known_horizon.initial, horizon.initial, strict=True):
+            assert b.lower <= a.lower <= b.upper
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks())
+def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
+    whole = explore_space(of, Limits())
+    assume(len(whole.states) > 2)
+    known = reachability(whole, Limits()).initial.exact
+    assert known is not None
+    for depth in (0, 1, 2):
+        bounds = best_probability(explore_space(of, Limits(), depth), Limits())
+        assert bounds.lower <= known <= bounds.upper
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks())
+def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
+    found = solved(of)
+    cheapest = least_cost(found, Limits())
+    negative = any(draw.cost < 0 for draw in found.space.draws)
+    assert (cheapest is None) == negative
+    if cheapest is None:
+        return
+    assert cheapest.exact
+    space = found.space
+    open_states = [s for s in range(len(space.states)) if not found.zero[s] and not space.goal[s]]
+    number = {s: i for i, s in enumerate(open_states)}
+
+    def row(choice: int) -> tuple[Fraction, dict[int, Fraction]]:
+        cost, chances = Fraction(0), dict[int, Fraction]()
+        for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
+            draw = space.draws[space.edge_draw[edge]]
+            cost += draw.probability * draw.cost
+            target = int(space.edge_target[edge])
+            if target in number:
+                chances[number[target]] = chances.get(number[target], Fraction(0)) + draw.probability
+        return cost, chances
+
+    own = [row(int(cheapest.policy[s])) for s in open_states]
+    attained = solve([chances for _, chances in own], [cost for cost, _ in own])
+    assert attained is not None
+    for state, value in zip(open_states, attained, strict=True):
+        assert cheapest.best[cheapest.policy[state]]
+        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
+            if found.best[choice]:
+                cost, chances = row(choice)
+                total = cost + sum(p * attained[t] for t, p in chances.items())
+                assert total >= value
+                assert bool(cheapest.best[choice]) == (total == value)
+    expected = sum((p * attained[number[s]] for p, s in space.initial if s in number), Fraction(0))
+    assert cheapest.initial == expected
+
+
+# --- by hand ---------------------------------------------------------------------------------
+
+
+def test_a_loop_that_can_be_left_only_with_a_loss_is_not_worth_more_than_its_exit() -> None:
+    """Two rooms one can go round in for ever (an end component), and one risky way out."""
+    there, back = action("there", Is(0, F), ("1", {0: T})), action("back", Is(0, T), ("1", {0: F}))
+    risk = action("risk", Is(2, F), ("1/3", {1: T, 2: T}), ("2/3", {2: T}))
+    of = task("room won over", {}, Is(1, T), there, back, risk)
+    assert solved(of).initial.exact == Fraction(1, 3)
+
+
+def test_a_task_whose_goal_nothing_reaches_has_the_value_0_and_costs_nothing() -> None:
+    found = solved(task("a b", {}, Is(0, T), action("b", Is(1, F), ("1", {1: T}))))
+    assert found.initial.exact == 0
+    cheapest = least_cost(found, Limits())
+    assert cheapest is not None
+    assert cheapest.initial == 0
+
+
+def test_initial_states_count_by_their_weight() -> None:
+    import dataclasses
+
+    from bbtc.ground.task import InitialState
+
+    base = task("a", {}, Is(0, T))
+    two = (InitialState(Fraction(1, 4), (T,)), InitialState(Fraction(3, 4), (F,)))
+    assert solved(dataclasses.replace(base, initial=two)).initial.exact == Fraction(1, 4)
+
+
+def test_no_time_left_is_a_limit() -> None:
+    of = task("a", {}, Is(0, T), action("try", Is(0, F), ("1/2", {0: T}), ("1/2", {})))
+    space = explore_space(of, Limits())
+    late = Limits(seconds=1e-9)
+    with pytest.raises(LimitReached):
+        reachability(space, late)
+
+
+def test_a_large_loop_of_states_is_solved_exactly() -> None:
+    """The gambler's ruin: from i of n, up or down by one with equal chance; value i/n."""
+    n = 40
+    rows = [{t: Fraction(1, 2) for t in (i - 1, i + 1) if 0 <= t < n - 1} for i in range(n - 1)]
+    wins = [Fraction(1, 2) if i == n - 2 else Fraction(0) for i in range(n - 1)]
+    assert solve(rows, wins) == [Fraction(i + 1, n) for i in range(n - 1)]
