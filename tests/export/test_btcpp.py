@@ -119,7 +119,7 @@ def test_random_trees_keep_the_rules_of_the_engine(seed: int) -> None:
     assert export(tree) == text
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+@settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_neither_break_the_file_nor_change_what_it_does(tree: Tree) -> None:
     pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")

@@ -110,7 +110,7 @@ def test_the_module_runs_as_a_program(written: list[Path]) -> None:
     assert 150 < int(counted[0]) < 250
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+@settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_neither_become_code_nor_change_what_it_does(tree: Tree) -> None:
     source = export(tree)

@@ -255,7 +255,7 @@ def create_root(robot: Robot) -> Behaviour:
                                             lambda: robot.blocked("packing", "b1"),
                                         ),
                                         Condition(
-                                            "(at(packing) or ((at(b1) or (at(packing) and not blocked(packing,b1))) and not blocked(packing,b1)))",
+                                            "(at(packing) or ((at(b1) or (at(packing) and not blocked(pa…",
                                             lambda: any_of(
                                                 robot.at("packing"),
                                                 all_of(
@@ -302,7 +302,7 @@ def create_root(robot: Robot) -> Behaviour:
                     sequence(
                         "sequence for at(packing)",
                         Condition(
-                            "(at(packing) or ((at(b1) or (at(packing) and not blocked(packing,b1))) and not blocked(packing,b1)))",
+                            "(at(packing) or ((at(b1) or (at(packing) and not blocked(pa…",
                             lambda: any_of(
                                 robot.at("packing"),
                                 all_of(
