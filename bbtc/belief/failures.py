@@ -38,15 +38,16 @@ class FailureFinder:
         """The conditions ticked and not true, deepest first; of equals, the last ticked first.
 
         Paper, section "Finding a condition to resolve": the first of these is the deepest failed
-        condition of the state.
+        condition of the state. Where the tree is blocked, unknown conditions come before false
+        ones: a false one deeper in a branch that failed over is not what stopped it.
         """
         self._seen.clear()
-        self._tick(state.values, state.finished)
+        root = self._tick(state.values, state.finished)
         found = [
             Failing(node.id, self._condition(node, state), Status(status), self._depth[node.id])
             for node, status in reversed(self._seen)
         ]
-        return sorted(found, key=lambda f: -f.depth)
+        return sorted(found, key=lambda f: (f.status != root, -f.depth))
 
     def _condition(self, node: ConditionNode | ActionNode, state: State) -> Condition:
         if isinstance(node, ConditionNode):

@@ -32,6 +32,13 @@ def counted(number: int, noun: str) -> str:
 def refinement_line(number: int, step: Refinement) -> list[str]:
     """One refinement as lines of text: what stopped the runs, what was done, what came of it."""
     why = f"{step.condition} is {step.value.word} in {exact(step.probability)} of the runs"
+    if step.kind == "retreat":
+        taken = counted(step.taken_back, "refinement")
+        return [
+            f"{number:3d}. no progress: take back {taken}, and do not insert {step.inserted} for "
+            f"{step.condition} again",
+            f"     success {exact(step.success)}, {step.nodes} nodes",
+        ]
     if step.kind == "move":
         what = f"move the branch of {step.inserted}, which undid it, before it"
     else:

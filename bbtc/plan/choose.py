@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from bbtc.belief.state import State, Transition, compile_action
+from bbtc.belief.state import State, Transition, Values, compile_action
 from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
 from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth
@@ -32,9 +32,9 @@ class Target:
     subgoal: Subgoal
     value: Truth
     states: tuple[tuple[State, Fraction], ...]
-    idle: frozenset[str] = frozenset()
-    """Names of what was inserted for the condition already and never started in these states:
-    inserting it once more would not start either."""
+    excluded: frozenset[str] = frozenset()
+    """Names not to insert: what was inserted already and never started in these states (once
+    more, it would not start either), and what was taken back before."""
 
     @property
     def probability(self) -> Fraction:
@@ -81,11 +81,21 @@ class Chooser:
         self.reachability = RelaxedReachability(task)
         self._by_variable: dict[int, list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
+        self._helps: dict[tuple[Subgoal, int, Truth, Values, frozenset[str]], bool] = {}
         doings: list[Doing] = [*task.actions, *task.templates]
         for doing in doings:
             touched = {variable for effect in effects_of(doing.factors) for variable, _ in effect.sets}
             for variable in sorted(touched):
                 self._by_variable.setdefault(variable, []).append(doing)
+
+    def helps(self, target: Target) -> bool:
+        """Is there any candidate for a target of one state?"""
+        ((state, _),) = target.states
+        attempts = len(target.subgoal.sensing) + len(target.subgoal.acting)
+        key = (target.subgoal, attempts, target.value, state.values, target.excluded)
+        if key not in self._helps:
+            self._helps[key] = bool(self.candidates(target))
+        return self._helps[key]
 
     def candidates(self, target: Target) -> list[Candidate]:
         """Everything worth inserting for a target, best first; empty if nothing helps."""
@@ -98,7 +108,7 @@ class Chooser:
         doings: dict[str, Doing] = {}
         for variable in variables(goal):
             for doing in self._by_variable.get(variable, ()):
-                if doing.name not in ongoing and doing.name not in target.idle:
+                if doing.name not in ongoing and doing.name not in target.excluded:
                     doings[doing.name] = doing
         found: list[Candidate] = []
         for doing in doings.values():

@@ -122,19 +122,25 @@ def new_attempt(subgoal: Subgoal, doing: Doing | None, conditions: list[Conditio
     return attempt
 
 
-def changed_by(task: Task, body: Body) -> frozenset[int]:
-    """Variables that the actions of a template body can change."""
+def actions_in(task: Task, body: Body) -> Iterator[GroundAction]:
+    """The actions of a template body, called templates included, repeats included."""
     match body:
         case BodyControl():
-            return frozenset().union(*(changed_by(task, child) for child in body.children))
+            for child in body.children:
+                yield from actions_in(task, child)
         case BodyCondition():
-            return frozenset()
+            return
         case BodyAction():
-            return changes(task.action_by_name[body.action])
+            yield task.action_by_name[body.action]
         case BodyTemplate():
-            return changed_by(task, task.template_by_name[body.template].body)
+            yield from actions_in(task, task.template_by_name[body.template].body)
         case _:
             assert_never(body)
+
+
+def changed_by(task: Task, body: Body) -> frozenset[int]:
+    """Variables that the actions of a template body can change."""
+    return frozenset().union(*(changes(action) for action in actions_in(task, body)))
 
 
 def changes(action: GroundAction) -> frozenset[int]:

@@ -32,7 +32,8 @@ def without_idle_branches(task: Task, root: Node, chain: Chain) -> Node:
             return node
         children = node.children
         if node.kind == "fallback" and node.template is None:
-            children = tuple(c for c in children if c.id in active or not any(actions_of(c)))
+            used = tuple(c for c in children if c.id in active or not any(actions_of(c)))
+            children = used or children
         children = tuple(kept(child) for child in children)
         if node.kind == "fallback" and len(children) == 1:
             return children[0]

@@ -23,10 +23,11 @@ class Refinement:
     the action or template inserted, or whose branch was moved; once its preconditions hold,
     ``unmet`` of which did not hold yet, it makes the condition hold (known, if it was unknown) with
     probability ``chance``, and unknown, so that it can be observed, with ``open``.
-    ``success`` is the tree's success probability afterwards.
+    ``success`` is the tree's success probability afterwards. A retreat takes back the last
+    ``taken_back`` refinements, which brought nothing, the first of them being the one it names.
     """
 
-    kind: Literal["insert", "move"]
+    kind: Literal["insert", "move", "retreat"]
     condition: str
     value: Truth
     probability: Fraction
@@ -36,6 +37,7 @@ class Refinement:
     unmet: int = 0
     success: Fraction = Fraction(0)
     nodes: int = 0
+    taken_back: int = 0
 
 
 Progress: TypeAlias = Callable[[Refinement], None]

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from bbtc.ground.condition import Condition, evaluate
+from bbtc.ground.condition import evaluate
+from bbtc.ground.task import Effect, GroundAction, GroundTemplate, Task
 from bbtc.kleene import Truth
 from bbtc.plan.choose import Target
-from bbtc.plan.draft import Attempt, Draft, Subgoal
+from bbtc.plan.draft import Attempt, Draft, Subgoal, actions_in
 from bbtc.plan.relaxed import effects_of
 
 
@@ -29,6 +30,10 @@ class Threat:
     def resolve(self) -> None:
         """Move the later branch before the earlier one."""
         self.siblings.insert(self.earlier, self.siblings.pop(self.later))
+
+    def take_back(self) -> None:
+        """Undo :meth:`resolve`."""
+        self.siblings.insert(self.later, self.siblings.pop(self.earlier))
 
 
 def find_threat(
@@ -52,7 +57,7 @@ def find_threat(
             if pair in moved or pair[::-1] in moved:
                 continue
             for attempt in _attempts(siblings[later]):
-                if attempt in started and undoes(attempt, target.subgoal.condition, target):
+                if attempt in started and undoes(draft.task, attempt, target):
                     assert attempt.doing is not None
                     return Threat(siblings, earlier, later, attempt.doing.name)
         if subgoal.parent is None:
@@ -60,11 +65,10 @@ def find_threat(
         subgoal = subgoal.parent.subgoal
 
 
-def undoes(attempt: Attempt, condition: Condition, target: Target) -> bool:
-    """Can what was attempted make the condition other than true, as it is in the target's states?"""
-    if attempt.doing is None:
-        return False
-    for effect in effects_of(attempt.doing.factors):
+def undoes(task: Task, attempt: Attempt, target: Target) -> bool:
+    """Can what was attempted make the target's condition other than true, as it is in its states?"""
+    condition = target.subgoal.condition
+    for effect in _effects(task, attempt):
         for state, _ in target.states:
             # The state without the effect: was the condition true before these values were set?
             values = bytearray(state.values)
@@ -74,6 +78,18 @@ def undoes(attempt: Attempt, condition: Condition, target: Target) -> bool:
             if evaluate(condition, values) is Truth.TRUE:
                 return True
     return False
+
+
+def _effects(task: Task, attempt: Attempt) -> Iterator[Effect]:
+    """Everything an attempt can do; of a template, what the actions of its body do."""
+    match attempt.doing:
+        case GroundAction():
+            yield from effects_of(attempt.doing.factors)
+        case GroundTemplate():
+            for action in actions_in(task, attempt.doing.body):
+                yield from effects_of(action.factors)
+        case None:
+            return
 
 
 def _attempts(subgoal: Subgoal) -> Iterator[Attempt]:

@@ -53,7 +53,9 @@ def test_the_snippets_of_a_page_print_what_it_says(page: Path, tmp_path: Path) -
     shim.parent.mkdir()
     shim.write_text(f'#!/bin/sh\nexec {sys.executable} -m bbtc.cli.main "$@"\n')
     shim.chmod(0o755)
-    (shim.parent / "python").symlink_to(sys.executable)
+    python = shim.parent / "python"
+    python.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
+    python.chmod(0o755)
     path = f"{shim.parent}:{Path(sys.executable).parent}:{os.environ['PATH']}"
     for command, expected in sessions(page):
         if command.startswith("make "):
