@@ -14,11 +14,14 @@ from bbtc.export.registry import load_exporter, parse_options
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
+from bbtc.plan.bounds import judged
+from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.result import Plan, Progress
-from bbtc.plan.strategies import load_strategy
+from bbtc.plan.strategies import run_strategy
 from bbtc.source import SourceFile
 from bbtc.syntax.ast import Definition, Document
 from bbtc.tree.nodes import Tree
+from bbtc.tree.validate import check_tree
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +105,16 @@ def ground_model(model: Model, report: Report, limits: Limits) -> Task:
     return task
 
 
-def plan_task(task: Task, target: Fraction | None, strategy: str, limits: Limits, progress: Progress) -> Plan:
-    """Plan a tree; ``target`` None stands for the task's own goal probability.
+def plan_task(
+    task: Task,
+    target: Fraction | None,
+    strategy: str,
+    limits: Limits,
+    progress: Progress,
+    options: Options = DEFAULTS,
+) -> Plan:
+    """Plan a tree; ``target`` None stands for the task's own goal probability. Where the tree falls
+    short of it, the plan tells what any policy could reach.
 
     The tree is checked against the soundness invariants before it is returned; a violation is a
     bug and raises ``AssertionError``. Raises :class:`bbtc.diagnostics.LimitReached` where the
@@ -111,6 +122,7 @@ def plan_task(task: Task, target: Fraction | None, strategy: str, limits: Limits
     """
     wanted = task.goal_probability if target is None else target
     plan = load_strategy(strategy)(task, wanted, limits, progress)
+    check_tree(plan.tree)
     broken = violations(task, explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:
         raise AssertionError(f"unsound tree: {'; '.join(broken)}")
