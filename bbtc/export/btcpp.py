@@ -19,6 +19,7 @@ from bbtc.export.interface import Interface, Leaf, action_symbol, guard_of, inte
 from bbtc.export.names import Namer, Symbol, camel, identifiers, port_values, printable
 from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.export.shape import fit, normal, words_of
+from bbtc.ground.condition import Condition
 from bbtc.ground.task import GroundAction, Task
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 
@@ -95,7 +96,7 @@ class _Writer:
         self.tree_ids = Namer({*RESERVED, *self.names.ids.values()})
         self.hoisted: list[Element] = []
         self.action_trees: dict[tuple[str, bytes, Guard | None], Element] = {}
-        self.condition_trees: dict[str, Element] = {}
+        self.condition_trees: dict[Condition, Element] = {}
         self.subtree_ports: dict[str, tuple[str, ...]] = {}
         self.conditions = ConditionWriter(
             self.task, self.names.interface, self.names.ids, self.names.values, self.tree_ids
@@ -154,20 +155,24 @@ class _Writer:
     def _condition(self, node: ConditionNode, place: _Place) -> Element:
         condition = normal(self.task, node.condition)
         element = self.conditions.write(condition, {})
-        if not self.conditions.uses_register(condition):
-            if node.name:
-                element.set("name", printable(node.name))
-            return element
+        if self.conditions.uses_register(condition):
+            if condition not in self.condition_trees:
+                self.condition_trees[condition] = self._condition_tree(condition, element)
+            tree_id = self.condition_trees[condition].attrib["ID"]
+            label = node.name or words_of(self.task, condition).short
+            return Element("SubTree", ID=tree_id, name=place.unique(printable(label)))
+        if node.name:
+            label = printable(node.name)
+            element.set("name", place.unique(label) if element.tag == "SubTree" else label)
+        return element
+
+    def _condition_tree(self, condition: Condition, content: Element) -> Element:
         words = words_of(self.task, condition)
-        key = words.full
-        if key not in self.condition_trees:
-            tree_id = self.tree_ids.take(camel(words.short), seed=words.full)
-            tree = Element("BehaviorTree", ID=tree_id)
-            tree.set("_description", f"{words.full}, three-valued")
-            tree.append(element)
-            self.condition_trees[key] = tree
-        tree_id = self.condition_trees[key].attrib["ID"]
-        return Element("SubTree", ID=tree_id, name=place.unique(words.short))
+        tree_id = self.tree_ids.take(camel(words.short), seed=words.full)
+        tree = Element("BehaviorTree", ID=tree_id)
+        tree.set("_description", f"{words.full}, three-valued")
+        tree.append(content)
+        return tree
 
     def _action(self, node: ActionNode, place: _Place) -> Element:
         action = self.task.action_by_name[node.action]

@@ -131,6 +131,23 @@ def test_hostile_names_neither_break_the_file_nor_change_what_it_does(tree: Tree
         assert replay.run(script) == expected
 
 
+def test_names_that_look_alike_are_never_taken_for_one_another() -> None:
+    pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
+    variables = tuple(Variable(name, (), True) for name in ("p", "q\x01", "q\x02"))
+    either = [And((Is(0, Truth.TRUE), Is(index, Truth.TRUE))) for index in (1, 2)]
+    checks = tuple(ConditionNode(f"n{i}", condition, name="same") for i, condition in enumerate(either))
+    tree = tree_of(ControlNode("n", "fallback", checks), *variables)
+    check_form(export(tree))
+    replay = BtcppReplay(tree)
+    for values, status in (((2, 0, 2), "success"), ((2, 2, 0), "success"), ((2, 0, 0), "failure")):
+        assert replay.run(Script(values, ())).status == status
+
+
+def test_conditions_of_one_name_stay_apart() -> None:
+    known = tuple(ConditionNode(f"n{index}", Known(index), name="same") for index in (0, 1))
+    check_form(export(tree_of(ControlNode("n", "fallback", known), *(Variable(n, (), True) for n in "pq"))))
+
+
 def test_an_object_that_looks_like_a_number_reaches_the_action_as_it_is() -> None:
     pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
     actions = tuple(GroundAction("go", (name,), TRUE, ()) for name in ("007", "1e5", "inf", "nan"))
