@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from functools import cached_property
+
 from bbtc.ground.condition import FALSE, TRUE, Condition, Is, Known
 from bbtc.ground.reach import Reach
 from bbtc.ground.task import Variable
@@ -19,7 +22,8 @@ class Atoms:
     Leaves are made once and shared, and so are the pairs that effects set.
     """
 
-    def __init__(self, reach: Reach) -> None:
+    def __init__(self, reach: Reach, keep: Collection[tuple[str, Row]] | None = None) -> None:
+        """Only variables in ``keep`` are kept, if given: then no condition may read another."""
         self.reach = reach
         self.model = reach.usage.model
         self.universe = reach.universe
@@ -29,13 +33,18 @@ class Atoms:
             if name not in reach.usage.derived
         }
         self.keys = self._sorted_variables()
+        if keep is not None:
+            self.keys = [key for key in self.keys if key in keep]
         self.numbers: dict[str, dict[Row, int]] = {name: {} for name in self.model.predicates}
         for number, (predicate, row) in enumerate(self.keys):
             self.numbers[predicate][row] = number
-        self.variables = self._variables()
-        self.pairs = {value: [(number, value) for number in range(len(self.keys))] for value in _VALUES}
-        self._is = {value: [Is(number, value) for number in range(len(self.keys))] for value in _VALUES}
         self._tables: dict[tuple[str, Truth | None, bool], Leaves] = {}
+        self._is: dict[Truth, list[Is]] = {}
+
+    @cached_property
+    def pairs(self) -> dict[Truth, list[tuple[int, Truth]]]:
+        """For each value and variable, the pair that effects hold."""
+        return {value: [(number, value) for number in range(len(self.keys))] for value in _VALUES}
 
     def _possible_values(self, predicate: str) -> dict[Row, tuple[Truth, ...]]:
         """The values of every atom that may be something else than false."""
@@ -57,7 +66,8 @@ class Atoms:
             keys.sort(key=lambda key: f"{key[0]}({','.join(self.universe.args(key[1]))})")
         return keys
 
-    def _variables(self) -> tuple[Variable, ...]:
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables of the task, sorted by name."""
         spans = {(fact.predicate, fact.args): fact.span for fact in self.model.init.facts}
         made = []
         for predicate, row in self.keys:
@@ -77,9 +87,12 @@ class Atoms:
         key = (predicate, value, strict)
         if key not in self._tables:
             numbers = self.numbers[predicate]
+            if value is not None and value not in self._is:
+                self._is[value] = [Is(number, value) for number in range(len(self.keys))]
             self._tables[key] = {
                 row: self._leaf(numbers.get(row), values, value, strict)
                 for row, values in self._possible[predicate].items()
+                if row in numbers or (values[0] is not Truth.UNKNOWN and len(values) == 1)
             }
         return self._tables[key], TRUE if value in {Truth.FALSE, None} else FALSE
 

@@ -6,6 +6,7 @@ the grounder cannot be interrupted, a process can be ended when a limit is met.
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -104,20 +105,26 @@ def _collect(
     limits: Limits,
 ) -> dict[str, list[Row]]:
     assert process.stdout is not None
-    rows: dict[bytes, list[Row]] = {name.encode(): [] for name in outputs}
-    bounded = [name.encode() for name in counted]
+    rows: dict[str, list[Row]] = {name: [] for name in outputs}
     facts = 0
     for lines in _blocks(process.stdout.fileno()):
         facts += len(lines)
-        for line in lines:
-            # A fact reads `name(1,2).` or `name.`.
-            name, _, args = line.partition(b"(")
-            found = rows.get(name.rstrip(b"."))
-            if found is not None:
-                found.append(tuple(map(int, args[:-2].split(b","))) if args else ())
         limits.check_facts(facts)
-        limits.check_actions(sum(len(rows[name]) for name in bounded))
-    return {name.decode(): found for name, found in rows.items()}
+        # A fact reads `name(1,2).` or `name.`.
+        batch: dict[bytes, list[bytes]] = {name.encode(): [] for name in outputs}
+        for line in lines:
+            name, _, args = line.partition(b"(")
+            if name in batch:
+                batch[name].append(args)
+            elif name[-1:] == b"." and name[:-1].decode() in rows:
+                rows[name[:-1].decode()].append(())
+        for name, found in batch.items():
+            if found:
+                # The JSON reader turns many numbers at once into integers.
+                listed = b"],[".join(found).replace(b").", b"")
+                rows[name.decode()].extend(map(tuple, json.loads(b"[[%b]]" % listed)))
+        limits.check_actions(sum(len(rows[name]) for name in counted))
+    return rows
 
 
 def _blocks(descriptor: int) -> Iterator[list[bytes]]:

@@ -170,6 +170,21 @@ class LoweredEffect:
                 sets[number] = value
         return sets
 
+    def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
+        """Every variable that may be set, with the conditions under which it is."""
+        for number_of, _ in self._plain:
+            number = number_of(env)
+            if number is not None:
+                yield number, above
+        for loop, leaf in self._items:
+            if isinstance(leaf, _Setting):
+                for conditions in loop.guards(env, above):
+                    number = leaf.number(env)
+                    if number is not None:
+                        yield number, conditions
+        for chance in self._chances:
+            yield from chance.settings(env, above)
+
     def part(self, env: Env, above: list[Condition]) -> _Part:
         """What happens in an environment, under the conditions above."""
         part = _Part()
@@ -238,6 +253,12 @@ class _LoweredChance:
         self._loop = _Loop(owner.lowering, frame, chance.parameters, chance.guard)
         self._branches = [(p, LoweredEffect(owner, block, frame)) for p, block in chance.branches]
         self._oneof = chance.oneof
+
+    def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
+        """Every variable that some branch may set, with the conditions under which it does."""
+        for conditions in self._loop.guards(env, above):
+            for _, branch in self._branches:
+                yield from branch.settings(env, conditions)
 
     def factors(self, env: Env, above: list[Condition]) -> Iterator[Factor]:
         """One draw for every binding. A draw nested in a branch as its only one is multiplied in (a

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 
 from typing_extensions import assert_never
@@ -17,6 +19,7 @@ from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normalise
 from bbtc.ground.prune import prune
 from bbtc.ground.reach import Reach, reach
+from bbtc.ground.relevance import Relevance
 from bbtc.ground.start import Beginning, beginning
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
@@ -31,40 +34,59 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     be grounded or its goal is unreachable even if nothing were ever undone, and
     :class:`bbtc.diagnostics.LimitReached` at a limit.
     """
-    return prune(instantiate(model, report, limits))
+    if model.templates:
+        return prune(instantiate(model, report, limits))
+    with _collector_paused():
+        begin, reached = _reached(model, report, limits)
+        atoms = Atoms(reached)
+        relevance = Relevance(atoms, _goal(model, atoms, report), reached.actions)
+        limits.check_time("grounding")
+        builder = _TaskBuilder(model, Atoms(reached, relevance.keep()), report, begin)
+        return builder.task(relevance.rows(), limits)
 
 
 def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """:func:`ground` without leaving out what cannot matter to the goal."""
+    with _collector_paused():
+        begin, reached = _reached(model, report, limits)
+        builder = _TaskBuilder(model, Atoms(reached), report, begin)
+        return builder.task(reached.actions, limits)
+
+
+@contextmanager
+def _collector_paused() -> Iterator[None]:
+    """Millions of small objects are made, none of them in a cycle: looking for cycles meanwhile
+    takes longer than making them."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _reached(model: md.Model, report: Report, limits: Limits) -> tuple[Beginning, Reach]:
     _refuse(model, report)
     begin = beginning(model, report, limits)
     report.raise_errors()
     reached = reach(model, begin, limits)
-    builder = _TaskBuilder(model, reached, report, begin)
-    goal = builder.goal()
+    limits.check_actions(sum(map(len, reached.actions)) + sum(map(len, reached.templates)))
+    return begin, reached
+
+
+def _goal(model: md.Model, atoms: Atoms, report: Report) -> Condition:
+    """The goal. Raises with an error for each part of it that nothing can ever make true."""
+    assert model.goal is not None
+    lowering = Lowering(atoms)
+    parts = []
+    for part in conjuncts(model.goal):
+        if lowering.ground(part, strict=True) is FALSE:
+            unreachable(model, part, report)
+        else:
+            parts.append(lowering.ground(part))
     report.raise_errors()
-    actions = builder.actions()
-    templates = builder.templates()
-    limits.check_actions(len(actions) + len(templates))
-    limits.check_time("grounding")
-    initial = builder.initial()
-    report.raise_errors()
-    if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
-        report.warning("BBT0413", "the goal already holds at the start", model.goal_span)
-    return gt.Task(
-        domain=model.domain,
-        problem=model.problem or "",
-        variables=builder.atoms.variables,
-        initial=initial,
-        goal=goal,
-        actions=actions,
-        templates=templates,
-        goal_probability=model.goal_probability,
-        goal_reward=model.goal_reward,
-        metric=model.metric,
-        signatures=_signatures(model),
-        goal_span=model.goal_span,
-    )
+    return conjunction(parts)
 
 
 def _refuse(model: md.Model, report: Report) -> None:
@@ -101,13 +123,13 @@ def _signatures(model: md.Model) -> tuple[gt.Signature, ...]:
 
 
 class _TaskBuilder:
-    def __init__(self, model: md.Model, reached: Reach, report: Report, begin: Beginning) -> None:
+    def __init__(self, model: md.Model, atoms: Atoms, report: Report, begin: Beginning) -> None:
         self.model = model
-        self.reached = reached
+        self.reached = atoms.reach
         self.report = report
         self.begin = begin
-        self.universe = reached.universe
-        self.atoms = Atoms(reached)
+        self.universe = atoms.universe
+        self.atoms = atoms
         self.lowering = Lowering(self.atoms)
         self.effects = EffectLowering(self.lowering, report)
         self._templates: dict[str, gt.GroundTemplate] = {}
@@ -116,14 +138,41 @@ class _TaskBuilder:
             name: _TemplateMaker(self, template) for name, template in self.model.templates.items()
         }
 
+    def task(self, rows: list[list[Row]], limits: Limits) -> gt.Task:
+        """The task with the actions of the given rows, in the order of the model's schemas."""
+        model, report = self.model, self.report
+        variables = self.atoms.variables()
+        goal = _goal(model, self.atoms, report)
+        initial = self._initial(variables)
+        actions = self._actions(rows, limits)
+        templates = self._all_templates()
+        report.raise_errors()
+        if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
+            report.warning("BBT0413", "the goal already holds at the start", model.goal_span)
+        limits.check_time("grounding")
+        return gt.Task(
+            domain=model.domain,
+            problem=model.problem or "",
+            variables=variables,
+            initial=initial,
+            goal=goal,
+            actions=actions,
+            templates=templates,
+            goal_probability=model.goal_probability,
+            goal_reward=model.goal_reward,
+            metric=model.metric,
+            signatures=_signatures(model),
+            goal_span=model.goal_span,
+        )
+
     # --- actions -----------------------------------------------------------------------------
 
-    def actions(self) -> tuple[gt.GroundAction, ...]:
+    def _actions(self, rows: list[list[Row]], limits: Limits) -> tuple[gt.GroundAction, ...]:
         """Every action that can ever apply, sorted by name."""
         called = self._called()
         made: dict[str, list[gt.GroundAction]] = {}
-        for schema, rows in zip(self.model.schemas.values(), self.reached.actions, strict=True):
-            made[schema.name] = self._instances(schema, rows)
+        for schema, each in zip(self.model.schemas.values(), rows, strict=True):
+            made[schema.name] = self._instances(schema, each, limits)
             if schema.name in called:
                 self._rows[schema.name] = {self.universe.row(action.args) for action in made[schema.name]}
         ordered = (action for name in sorted(made, key=lambda name: f"{name}(") for action in made[name])
@@ -131,14 +180,16 @@ class _TaskBuilder:
             return tuple(ordered)
         return tuple(sorted(ordered, key=lambda action: action.name))
 
-    def _instances(self, schema: md.Schema, rows: list[Row]) -> list[gt.GroundAction]:
+    def _instances(self, schema: md.Schema, rows: list[Row], limits: Limits) -> list[gt.GroundAction]:
         frame = Frame(self.universe, schema.parameters)
         precondition = self.lowering.condition(schema.precondition, frame, strict=True)
         effect = self.effects.effect(self.reached.usage.blocks[schema.name], frame)
         unit, counts_cost = Fraction(1), self.model.counts_cost
         args, name, span = self.universe.args, schema.name, schema.span
         made = []
-        for row in rows:
+        for count, row in enumerate(rows):
+            if not count & 0xFFF:
+                limits.check_time("grounding")
             env = frame.env(row)
             condition = precondition(env)
             if condition is FALSE:
@@ -171,7 +222,7 @@ class _TaskBuilder:
 
     # --- templates ---------------------------------------------------------------------------
 
-    def templates(self) -> tuple[gt.GroundTemplate, ...]:
+    def _all_templates(self) -> tuple[gt.GroundTemplate, ...]:
         """Every template whose guide can apply, and those they call, sorted by name."""
         for name, rows in zip(self.model.templates, self.reached.templates, strict=True):
             for row in rows:
@@ -186,28 +237,16 @@ class _TaskBuilder:
             self._templates[name] = self._makers[template].make(row)
         return name
 
-    # --- initial states and goal -------------------------------------------------------------
+    # --- initial states ----------------------------------------------------------------------
 
-    def initial(self) -> tuple[gt.InitialState, ...]:
+    def _initial(self, variables: tuple[gt.Variable, ...]) -> tuple[gt.InitialState, ...]:
         """The initial states, equal ones merged."""
-        variables = self.atoms.variables
         merged: dict[tuple[Truth, ...], Fraction] = {}
         for probability, world in self.begin.states:
             facts = {**self.begin.facts, **world} if world else self.begin.facts
             values = tuple(facts.get((each.predicate, each.args), Truth.FALSE) for each in variables)
             merged[values] = merged.get(values, Fraction(0)) + probability
         return tuple(gt.InitialState(probability, values) for values, probability in merged.items())
-
-    def goal(self) -> Condition:
-        """The goal; an error names each part of it that nothing can ever make true."""
-        assert self.model.goal is not None
-        parts = []
-        for part in conjuncts(self.model.goal):
-            if self.lowering.ground(part, strict=True) is FALSE:
-                unreachable(self.model, part, self.report)
-            else:
-                parts.append(self.lowering.ground(part))
-        return conjunction(parts)
 
 
 class _TemplateMaker:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground.condition import evaluate
-from bbtc.ground.instantiate import instantiate
+from bbtc.ground.instantiate import ground, instantiate
 from bbtc.ground.prune import prune
 from bbtc.ground.task import Factor, GroundAction, Task
 from bbtc.kleene import Truth
@@ -142,6 +142,7 @@ def test_pruning_keeps_what_matters(text: str, data: st.DataObject) -> None:
     if task is None:
         return
     small = prune(task)
+    assert small == ground(model_of(text), Report(), Limits())
     state = [data.draw(st.sampled_from(sorted(variable.values))) for variable in task.variables]
     kept = [task.variable_index[variable.name] for variable in small.variables]
     part = [state[index] for index in kept]
