@@ -76,6 +76,7 @@ CODES: dict[str, str] = {
     # 05xx: planning
     "BBT0501": "unknown strategy",
     "BBT0502": "nothing left to insert before the target",
+    "BBT0503": "option that the strategy does not know",
     # 06xx: artefacts, and the shape of trees
     "BBT0601": "artefact is not valid JSON",
     "BBT0602": "artefact of another format or version",

@@ -121,7 +121,8 @@ def plan_task(
     limits do not allow any tree at all.
     """
     wanted = task.goal_probability if target is None else target
-    plan = load_strategy(strategy)(task, wanted, limits, progress)
+    plan = run_strategy(strategy, task, wanted, limits=limits, progress=progress, options=options)
+    plan = judged(plan, limits, options)
     check_tree(plan.tree)
     broken = violations(task, explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:

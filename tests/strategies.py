@@ -234,7 +234,8 @@ def trees(draw: st.DrawFn, names: st.SearchStrategy[str] = PLAIN_NAMES, depth: i
     task = draw(tasks(names))
     probability = draw(st.fractions(0, 1, max_denominator=1000))
     target = draw(st.sampled_from([Fraction(1), Fraction("0.9"), Fraction(1, 3)]))
-    return Tree(task, draw(nodes(task, depth)), probability, target, draw(st.sampled_from(STATUSES)))
+    bounds = draw(st.none() | st.just((probability, Fraction(1))))
+    return Tree(task, draw(nodes(task, depth)), probability, target, draw(st.sampled_from(STATUSES)), bounds)
 
 
 def soda_task() -> Task:

@@ -46,6 +46,7 @@ VERSION = 1
 _CONTROLS: Mapping[str, ControlKind] = {kind: kind for kind in get_args(ControlKind)}
 _STATUSES: Mapping[str, Status] = {status: status for status in get_args(Status)}
 _LABELS = ("name", "template", "reason")
+_BOUNDS = ("lower", "upper")
 
 # --- out -------------------------------------------------------------------------------------
 
@@ -54,7 +55,7 @@ def tree_to_json(tree: Tree) -> Json:
     """The tree as a JSON object."""
     used = {node.action for node in actions_of(tree.root)}
     task = replace(tree.task, actions=tuple(a for a in tree.task.actions if a.name in used), templates=())
-    return {
+    value: Json = {
         "format": FORMAT,
         "version": VERSION,
         "domain": task.domain,
@@ -62,9 +63,10 @@ def tree_to_json(tree: Tree) -> Json:
         "success_probability": figure_text(tree.success_probability),
         "target": given_text(tree.target),
         "status": tree.status,
-        "root": _node_to_json(tree.root, task),
-        "task": task_to_json(task),
     }
+    if tree.bounds is not None:
+        value["bounds"] = dict(zip(_BOUNDS, map(figure_text, tree.bounds), strict=True))
+    return value | {"root": _node_to_json(tree.root, task), "task": task_to_json(task)}
 
 
 def _node_to_json(node: Node, task: Task) -> Json:
@@ -103,7 +105,7 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
     check_header(at, FORMAT, VERSION)
     members = at.members(
         ["format", "version", "domain", "problem", "success_probability", "status", "root"],
-        ["target", "task"],
+        ["target", "bounds", "task"],
     )
     if task is None:
         if "task" not in members:
@@ -121,6 +123,7 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
             Fraction(1),
         ),
         faults.attempt(lambda: _STATUSES[members["status"].word(*_STATUSES)], "stuck"),
+        faults.attempt(lambda: _bounds(members["bounds"]) if "bounds" in members else None, None),
     )
     for field, expected in (("domain", task.domain), ("problem", task.problem)):
         if faults.attempt(members[field].string, expected) != expected:
@@ -129,6 +132,14 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
     for problem in tree_problems(tree):
         faults.add(problem_fault(problem, members["root"].path))
     return tree
+
+
+def _bounds(at: At) -> tuple[Fraction, Fraction]:
+    members = at.members(_BOUNDS)
+    lower, upper = (members[end].probability() for end in _BOUNDS)
+    if lower > upper:
+        raise at.fault("BBT0604", "the lower bound is above the upper one")
+    return lower, upper
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from bbtc.cli.session import (
 if TYPE_CHECKING:
     from bbtc.ground.task import Task
     from bbtc.limits import Limits
+    from bbtc.plan.options import Options
     from bbtc.plan.result import Plan, Refinement
     from bbtc.tree.nodes import Status
 
@@ -41,6 +42,9 @@ STATUS_EXIT: dict[Status, int] = {
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
 @click.option("--strategy", default="refine", show_default=True, help="How to plan.")
+@click.option("--max-actions", type=click.IntRange(0), metavar="K", help="Let no run take more actions.")
+@click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
+@click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
 @limit_options
 @output_options
@@ -50,6 +54,9 @@ def command(
     files: tuple[str, ...],
     target: Fraction | None,
     strategy: str,
+    max_actions: int | None,
+    bounds: bool,
+    as_json: bool,
     quiet: bool,
     time_limit: float | None,
     max_states: int,
@@ -63,26 +70,59 @@ def command(
     Each refinement is printed: the condition that stopped the runs, what was inserted for it, and
     the success probability after it. Exit status 0: target reached; 1: out of reach of any policy;
     3: a limit was reached, or nothing was left to insert (the best tree is written all the same).
+
+    With --bounds, the best success probability of any policy is printed in place of a plan; 0: the
+    target can be reached; 1: it cannot; 3: a limit leaves that open.
     """
     from bbtc import artefacts
     from bbtc.cli.inputs import load_task
+    from bbtc.plan.options import Options
 
+    if as_json and not bounds:
+        raise click.UsageError("--json goes with --bounds: a tree is always written as JSON.")
     limits = limits_from(time_limit, max_states, max_nodes)
     task = load_task(session, files, limits)
-    plan = run_planner(session, task, target, strategy, limits, quiet=quiet)
+    options = Options(max_actions=max_actions)
+    if bounds:
+        wanted = task.goal_probability if target is None else target
+        return _print_bounds(task, wanted, limits, options, output, as_json=as_json)
+    plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet)
     write(output, artefacts.dumps(artefacts.tree_to_json(plan.tree)), check=check)
     if depfile is not None:
         write_depfile(depfile, output, session.inputs)
     return STATUS_EXIT[plan.tree.status]
 
 
+def _print_bounds(
+    task: Task, target: Fraction, limits: Limits, options: Options, output: str, *, as_json: bool
+) -> int:
+    from bbtc.cli.bounds_report import bounds_json, bounds_report
+    from bbtc.plan.bounds import task_value
+
+    value = task_value(task, limits, options, costs=True)
+    text = bounds_json(value, target) if as_json else bounds_report(task, value, target)
+    write(output, text)
+    if value.lower >= target:
+        return 0
+    return EXIT_ERRORS if value.upper < target else EXIT_LIMIT
+
+
 def run_planner(
-    session: Session, task: Task, target: Fraction | None, strategy: str, limits: Limits, *, quiet: bool
+    session: Session,
+    task: Task,
+    target: Fraction | None,
+    strategy: str,
+    limits: Limits,
+    options: Options | None = None,
+    *,
+    quiet: bool,
 ) -> Plan:
     """Plan, telling the session each refinement as it is made and how planning ended."""
+    from bbtc.cli.bounds_report import bounds_lines
     from bbtc.cli.wording import exact, plan_summary, refinement_line
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
+    from bbtc.plan.options import DEFAULTS
 
     count = 0
 
@@ -96,14 +136,14 @@ def run_planner(
     if not quiet:
         wanted = task.goal_probability if target is None else target
         session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
-    plan = plan_task(task, target, strategy, limits, tell)
+    plan = plan_task(task, target, strategy, limits, tell, options or DEFAULTS)
     if plan.tree.status == "stuck":
         session.report.warning(
             "BBT0502",
             f"the strategy '{strategy}' has nothing left to insert before the target",
             task.goal_span,
-            hint="this does not prove that the target is out of reach",
+            hint="another strategy may reach it",
         )
-    for line in plan_summary(plan):
+    for line in [*plan_summary(plan), *bounds_lines(plan.tree)]:
         session.say(line)
     return plan

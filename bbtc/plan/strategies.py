@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from bbtc.diagnostics import BbtcError
-from bbtc.plan.refine import refine
-from bbtc.plan.result import Strategy
+from fractions import Fraction
+from importlib import import_module
 
-STRATEGIES: dict[str, Strategy] = {"refine": refine}
+from bbtc.diagnostics import BbtcError
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.plan.options import Options
+from bbtc.plan.result import Plan, Progress, Strategy
+
+STRATEGIES = {
+    "refine": ("bbtc.plan.refine", "refine"),
+}
+"""Module and function of each strategy, imported when used."""
+
 DEFAULT = "refine"
 
 
@@ -16,4 +25,17 @@ def load_strategy(name: str) -> Strategy:
         raise BbtcError.single(
             "BBT0501", f"unknown strategy '{name}'", hint=f"known: {', '.join(STRATEGIES)}"
         )
-    return STRATEGIES[name]
+    module, function = STRATEGIES[name]
+    strategy: Strategy = getattr(import_module(module), function)
+    return strategy
+
+
+def run_strategy(
+    name: str, task: Task, target: Fraction, *, limits: Limits, progress: Progress, options: Options
+) -> Plan:
+    """Plan with a strategy. Raises :class:`BbtcError` for an unknown one, and for options that it
+    does not know."""
+    strategy = load_strategy(name)
+    if options.max_actions is not None:
+        raise BbtcError.single("BBT0503", f"the strategy '{name}' does not plan within a number of actions")
+    return strategy(task, target, limits, progress)

@@ -75,7 +75,8 @@ Status: TypeAlias = Literal["target-reached", "out-of-reach", "stuck", "limit-re
 class Tree:
     """A tree with the task its conditions and actions refer to, and the planner's claim.
 
-    ``success_probability`` is exact; ``target`` is the probability that was asked for.
+    ``success_probability`` is exact; ``target`` is the probability that was asked for. ``bounds``,
+    where known, hold the best probability that any policy could reach.
     """
 
     task: Task
@@ -83,6 +84,7 @@ class Tree:
     success_probability: Fraction
     target: Fraction
     status: Status
+    bounds: tuple[Fraction, Fraction] | None = None
 
 
 def walk(node: Node) -> Iterator[Node]:

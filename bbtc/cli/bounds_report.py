@@ -1,0 +1,64 @@
+"""What any policy can reach, in words and as JSON."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+
+from bbtc.artefacts.numbers import figure_text
+from bbtc.cli.wording import counted, exact
+from bbtc.ground.describe import describe
+from bbtc.ground.task import Task
+from bbtc.plan.bounds import TaskValue
+from bbtc.tree.nodes import Tree
+
+
+def best_possible(lower: Fraction, upper: Fraction) -> str:
+    """``1/2 (0.5)``, or ``between 1/2 (0.5) and 1``."""
+    return exact(lower) if lower == upper else f"between {exact(lower)} and {exact(upper)}"
+
+
+def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
+    """The value of a task, as lines of text."""
+    within = ""
+    if value.max_actions is not None:
+        within = f" with at most {counted(value.max_actions, 'action')}"
+    verdict = "undecided"
+    if value.lower >= target:
+        verdict = "can be reached"
+    elif value.upper < target:
+        verdict = "out of reach"
+    lines = [
+        f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}",
+        f"best success probability{within}: {best_possible(value.lower, value.upper)}",
+        f"target {exact(target)}: {verdict}",
+    ]
+    if value.cost is not None:
+        mark = "" if value.cost_exact else "about "
+        lines.append(f"least expected cost of reaching it so often: {mark}{exact(value.cost)}")
+    lines.append(f"{counted(value.states, 'state')}, {counted(value.choices, 'choice')}")
+    if value.stop is not None:
+        lines.append(value.stop.message)
+    return "".join(f"{line}\n" for line in lines)
+
+
+def bounds_lines(tree: Tree) -> list[str]:
+    """What any policy can reach, as far as the planner found out."""
+    if tree.bounds is None:
+        return []
+    return [f"the best that any policy can do is {best_possible(*tree.bounds)}"]
+
+
+def bounds_json(value: TaskValue, target: Fraction) -> str:
+    """The value of a task as a JSON object; numbers are exact, as text."""
+    found: dict[str, object] = {
+        "lower": figure_text(value.lower),
+        "upper": figure_text(value.upper),
+        "target": figure_text(target),
+        "max_actions": value.max_actions,
+        "cost": None if value.cost is None or not value.cost_exact else figure_text(value.cost),
+        "states": value.states,
+        "choices": value.choices,
+        "stop": None if value.stop is None else value.stop.message,
+    }
+    return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
