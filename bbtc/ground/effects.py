@@ -14,7 +14,6 @@ from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin
 from bbtc.ground.normal import Block, Chance, Item, free
 from bbtc.ground.task import Effect, Factor, Outcome
-from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -137,7 +136,7 @@ class LoweredEffect:
         if isinstance(leaf, me.Add):
             self._items.append((loop, _Addition(self._owner, leaf, frame)))
             return
-        number = _number(self._owner.atoms.numbers[leaf.predicate], frame.rows(leaf.args))
+        number = self._owner.lowering.number(leaf.predicate, leaf.args, frame)
         if loop.trivial:
             self._plain.append((number, leaf.value))
         else:
@@ -170,6 +169,11 @@ class LoweredEffect:
                 sets[number] = value
         return sets
 
+    @property
+    def plain(self) -> list[Callable[[Env], int | None]] | None:
+        """The variables set by an effect without chance, quantifiers and guards; None for others."""
+        return None if self._items or self._chances else [number for number, _ in self._plain]
+
     def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
         """Every variable that may be set, with the conditions under which it is."""
         for number_of, _ in self._plain:
@@ -201,12 +205,6 @@ class LoweredEffect:
                 else:
                     _absorb(part, factor.outcomes[0])
         return part
-
-
-def _number(numbers: dict[Row, int], rows: Callable[[Env], Row]) -> Callable[[Env], int | None]:
-    """The variable of an atom; None for an atom that never changes."""
-    get = numbers.get
-    return lambda env: get(rows(env))
 
 
 @dataclass(frozen=True, slots=True)

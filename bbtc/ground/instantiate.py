@@ -42,7 +42,9 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
         relevance = Relevance(atoms, _goal(model, atoms, report), reached.actions)
         limits.check_time("grounding")
         builder = _TaskBuilder(model, Atoms(reached, relevance.keep()), report, begin)
-        return builder.task(relevance.rows(), limits)
+        rows = relevance.rows()
+        del relevance
+        return builder.task(rows, limits)
 
 
 def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
@@ -139,7 +141,8 @@ class _TaskBuilder:
         }
 
     def task(self, rows: list[list[Row]], limits: Limits) -> gt.Task:
-        """The task with the actions of the given rows, in the order of the model's schemas."""
+        """The task with the actions of the given rows (which are used up), in the order of the
+        model's schemas."""
         model, report = self.model, self.report
         variables = self.atoms.variables()
         goal = _goal(model, self.atoms, report)
@@ -187,8 +190,11 @@ class _TaskBuilder:
         unit, counts_cost = Fraction(1), self.model.counts_cost
         args, name, span = self.universe.args, schema.name, schema.span
         made = []
-        for count, row in enumerate(rows):
-            if not count & 0xFFF:
+        # Each row is given up as its action is made: a million of them take 100 MB.
+        rows.reverse()
+        while rows:
+            row = rows.pop()
+            if not len(rows) & 0xFFF:
                 limits.check_time("grounding")
             env = frame.env(row)
             condition = precondition(env)

@@ -114,6 +114,11 @@ class Lowering:
             case _:
                 assert_never(formula)
 
+    def number(self, predicate: str, args: tuple[mf.Term, ...], frame: Frame) -> Callable[[Env], int | None]:
+        """The variable of an atom; None for an atom that never changes."""
+        rows, get = frame.rows(args), self.atoms.numbers[predicate].get
+        return lambda env: get(rows(env))
+
     def _late(self, part: mf.Formula) -> int:
         """Constant parts first: they often settle the whole without a look at the rest. Parts that
         are not constant keep their order."""
