@@ -15,6 +15,7 @@ class Limits:
     ``seconds`` counts from the moment the object is made. ``states`` bounds the physical states
     of one simulation, ``nodes`` the nodes of a tree. Of grounding, ``actions`` bounds the ground
     actions and templates, ``facts`` everything that the reachability analysis derives,
+    ``bindings`` the objects that quantifiers are tried with,
     ``memory`` the bytes its engine may take, ``initial_states`` what a draw in ``:init`` is spelled
     out into.
     """
@@ -24,6 +25,7 @@ class Limits:
     nodes: int = 10_000
     actions: int = 2_000_000
     facts: int = 10_000_000
+    bindings: int = 100_000_000
     memory: int | None = 4 << 30
     initial_states: int = 256
     _start: float = field(default_factory=time.monotonic, compare=False, repr=False)
@@ -61,6 +63,11 @@ class Limits:
         """Raise :class:`LimitReached` if ``count`` derived facts are too many."""
         if count > self.facts:
             raise self.reached(f"the limit of {self.facts} derived facts ended grounding", "--max-facts")
+
+    def check_bindings(self, count: int) -> None:
+        """Raise :class:`LimitReached` if ``count`` bindings of quantifiers are too many."""
+        if count > self.bindings:
+            raise self.reached(f"the limit of {self.bindings} quantifier bindings was met", "--max-bindings")
 
     @staticmethod
     def reached(message: str, option: str) -> LimitReached:

@@ -54,6 +54,7 @@ class _Loop:
         parameters: tuple[Parameter, ...],
         guard: tuple[mf.Formula, ...],
     ) -> None:
+        self._spend = lowering.spend
         pending = list(guard)
         later = {parameter.name for parameter in parameters}
         self._first = self._ready(lowering, frame, pending, later)
@@ -82,6 +83,7 @@ class _Loop:
             yield above
             return
         slot, members, parts = self._levels[level]
+        self._spend(len(members))
         for env[slot] in members:
             conditions = _met(parts, env, above)
             if conditions is not None:

@@ -39,20 +39,21 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     with _collector_paused():
         begin, reached = _reached(model, report, limits)
         atoms = Atoms(reached)
-        relevance = Relevance(atoms, _goal(model, atoms, report), reached.actions)
+        goal = _goal(model, atoms, report, limits)
+        relevance = Relevance(atoms, goal, reached.actions, limits)
         limits.check_time("grounding")
-        builder = _TaskBuilder(model, Atoms(reached, relevance.keep()), report, begin)
+        builder = _TaskBuilder(Atoms(reached, relevance.keep()), report, begin, limits)
         rows = relevance.rows()
         del relevance
-        return builder.task(rows, limits)
+        return builder.task(rows)
 
 
 def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """:func:`ground` without leaving out what cannot matter to the goal."""
     with _collector_paused():
         begin, reached = _reached(model, report, limits)
-        builder = _TaskBuilder(model, Atoms(reached), report, begin)
-        return builder.task(reached.actions, limits)
+        builder = _TaskBuilder(Atoms(reached), report, begin, limits)
+        return builder.task(reached.actions)
 
 
 @contextmanager
@@ -77,10 +78,10 @@ def _reached(model: md.Model, report: Report, limits: Limits) -> tuple[Beginning
     return begin, reached
 
 
-def _goal(model: md.Model, atoms: Atoms, report: Report) -> Condition:
+def _goal(model: md.Model, atoms: Atoms, report: Report, limits: Limits) -> Condition:
     """The goal. Raises with an error for each part of it that nothing can ever make true."""
     assert model.goal is not None
-    lowering = Lowering(atoms)
+    lowering = Lowering(atoms, limits)
     parts = []
     for part in conjuncts(model.goal):
         if lowering.ground(part, strict=True) is FALSE:
@@ -125,14 +126,15 @@ def _signatures(model: md.Model) -> tuple[gt.Signature, ...]:
 
 
 class _TaskBuilder:
-    def __init__(self, model: md.Model, atoms: Atoms, report: Report, begin: Beginning) -> None:
-        self.model = model
+    def __init__(self, atoms: Atoms, report: Report, begin: Beginning, limits: Limits) -> None:
+        self.model = atoms.model
+        self.limits = limits
         self.reached = atoms.reach
         self.report = report
         self.begin = begin
         self.universe = atoms.universe
         self.atoms = atoms
-        self.lowering = Lowering(self.atoms)
+        self.lowering = Lowering(atoms, limits)
         self.effects = EffectLowering(self.lowering, report)
         self._templates: dict[str, gt.GroundTemplate] = {}
         self._rows: dict[str, set[Row]] = {}
@@ -140,14 +142,14 @@ class _TaskBuilder:
             name: _TemplateMaker(self, template) for name, template in self.model.templates.items()
         }
 
-    def task(self, rows: list[list[Row]], limits: Limits) -> gt.Task:
+    def task(self, rows: list[list[Row]]) -> gt.Task:
         """The task with the actions of the given rows (which are used up), in the order of the
         model's schemas."""
-        model, report = self.model, self.report
+        model, report, limits = self.model, self.report, self.limits
         variables = self.atoms.variables()
-        goal = _goal(model, self.atoms, report)
+        goal = _goal(model, self.atoms, report, limits)
         initial = self._initial(variables)
-        actions = self._actions(rows, limits)
+        actions = self._actions(rows)
         templates = self._all_templates()
         report.raise_errors()
         if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
@@ -170,12 +172,12 @@ class _TaskBuilder:
 
     # --- actions -----------------------------------------------------------------------------
 
-    def _actions(self, rows: list[list[Row]], limits: Limits) -> tuple[gt.GroundAction, ...]:
+    def _actions(self, rows: list[list[Row]]) -> tuple[gt.GroundAction, ...]:
         """Every action that can ever apply, sorted by name."""
         called = self._called()
         made: dict[str, list[gt.GroundAction]] = {}
         for schema, each in zip(self.model.schemas.values(), rows, strict=True):
-            made[schema.name] = self._instances(schema, each, limits)
+            made[schema.name] = self._instances(schema, each)
             if schema.name in called:
                 self._rows[schema.name] = {self.universe.row(action.args) for action in made[schema.name]}
         ordered = (action for name in sorted(made, key=lambda name: f"{name}(") for action in made[name])
@@ -183,7 +185,7 @@ class _TaskBuilder:
             return tuple(ordered)
         return tuple(sorted(ordered, key=lambda action: action.name))
 
-    def _instances(self, schema: md.Schema, rows: list[Row], limits: Limits) -> list[gt.GroundAction]:
+    def _instances(self, schema: md.Schema, rows: list[Row]) -> list[gt.GroundAction]:
         frame = Frame(self.universe, schema.parameters)
         precondition = self.lowering.condition(schema.precondition, frame, strict=True)
         effect = self.effects.effect(self.reached.usage.blocks[schema.name], frame)
@@ -195,7 +197,7 @@ class _TaskBuilder:
         while rows:
             row = rows.pop()
             if not len(rows) & 0xFFF:
-                limits.check_time("grounding")
+                self.limits.check_time("grounding")
             env = frame.env(row)
             condition = precondition(env)
             if condition is FALSE:
@@ -297,8 +299,8 @@ class _TemplateMaker:
             case md.BodyForeach(parameters, child):
                 members = self.builder.universe.members
                 loops = [(self.frame.slot(p.name), members(p.types)) for p in parameters]
-                inner = self._body(child)
-                return lambda env: [each for bound in extend(env, loops) for each in inner(bound)]
+                inner, spend = self._body(child), self.builder.lowering.spend
+                return lambda env: [each for bound in extend(env, loops, spend) for each in inner(bound)]
             case _:
                 assert_never(body)
 

@@ -24,6 +24,7 @@ from bbtc.ground.condition import (
 from bbtc.ground.normal import conjuncts, disjuncts, normal_form
 from bbtc.ground.universe import Row, Universe
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.model import domain as md
 from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
@@ -71,14 +72,21 @@ class Frame:
 class Lowering:
     """Compiles the conditions of one model."""
 
-    def __init__(self, atoms: Atoms) -> None:
+    def __init__(self, atoms: Atoms, limits: Limits) -> None:
         self.atoms = atoms
         self.universe = atoms.universe
+        self._limits = limits
+        self._bindings = 0
         self._derived = _Derived(self)
 
     def condition(self, formula: mf.Formula, frame: Frame, *, strict: bool = False) -> Lowered:
         """``strict``: only whether the condition is true matters, not whether false or unknown."""
         return self.normal(normal_form(formula), frame, strict=strict)
+
+    def spend(self, count: int) -> None:
+        """Count objects that a quantifier is tried with. Raises at the limit."""
+        self._bindings += count
+        self._limits.check_bindings(self._bindings)
 
     def ground(self, formula: mf.Formula, *, strict: bool = False) -> Condition:
         """A condition without free parameters."""
@@ -108,7 +116,9 @@ class Lowering:
             case mf.Quantified(kind, (parameter,), inner):
                 slot, members = frame.slot(parameter.name), self.universe.members(parameter.types)
                 lowered = self.normal(inner, frame, strict=strict)
-                return (_for_all if kind == "forall" else _for_some)(slot, members, lowered)
+                if kind == "forall":
+                    return _for_all(slot, members, lowered, self.spend)
+                return _for_some(slot, members, lowered, self.spend)
             case mf.Not() | mf.Quantified():
                 raise AssertionError("not in normal form")
             case _:
@@ -182,8 +192,9 @@ def _any(parts: list[Lowered]) -> Lowered:
     return run
 
 
-def _for_all(slot: int, members: tuple[int, ...], inner: Lowered) -> Lowered:
+def _for_all(slot: int, members: tuple[int, ...], inner: Lowered, spend: Callable[[int], None]) -> Lowered:
     def run(env: Env) -> Condition:
+        spend(len(members))
         found = []
         for env[slot] in members:
             condition = inner(env)
@@ -196,8 +207,9 @@ def _for_all(slot: int, members: tuple[int, ...], inner: Lowered) -> Lowered:
     return run
 
 
-def _for_some(slot: int, members: tuple[int, ...], inner: Lowered) -> Lowered:
+def _for_some(slot: int, members: tuple[int, ...], inner: Lowered, spend: Callable[[int], None]) -> Lowered:
     def run(env: Env) -> Condition:
+        spend(len(members))
         found = []
         for env[slot] in members:
             condition = inner(env)
@@ -291,7 +303,7 @@ class _Derived:
             slots = dict(enumerate(rule.parameters))
             if all(self._bind(env, slot, number, slots) for slot, number in zip(head, row, strict=True)):
                 unbound = [(slot, members(p.types)) for slot, p in slots.items() if env[slot] < 0]
-                for bound in extend(env, unbound):
+                for bound in extend(env, unbound, self._lowering.spend):
                     yield condition(bound)
 
     def _bind(self, env: Env, slot: int, number: int, slots: dict[int, Parameter]) -> bool:
@@ -335,11 +347,12 @@ class _Derived:
         return disjunction([condition, self._unknown(condition)])
 
 
-def extend(env: Env, loops: list[tuple[int, tuple[int, ...]]]) -> Iterator[Env]:
+def extend(env: Env, loops: list[tuple[int, tuple[int, ...]]], spend: Callable[[int], None]) -> Iterator[Env]:
     """The environment with the given slots bound in every way (always the same list)."""
     if not loops:
         yield env
         return
     slot, members = loops[0]
+    spend(len(members))
     for env[slot] in members:
-        yield from extend(env, loops[1:])
+        yield from extend(env, loops[1:], spend)

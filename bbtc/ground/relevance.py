@@ -16,6 +16,7 @@ from bbtc.ground.effects import EffectLowering
 from bbtc.ground.lower import Env, Frame, Lowering
 from bbtc.ground.normal import conjuncts, normal_form
 from bbtc.ground.universe import Row
+from bbtc.limits import Limits
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -66,10 +67,10 @@ def _literals(
 class Relevance:
     """The closure: ``read`` are the variables that matter, as numbers of ``atoms``."""
 
-    def __init__(self, atoms: Atoms, goal: Condition, rows: list[list[Row]]) -> None:
+    def __init__(self, atoms: Atoms, goal: Condition, rows: list[list[Row]], limits: Limits) -> None:
         self._atoms = atoms
         model = atoms.model
-        lowering = Lowering(atoms)
+        lowering = Lowering(atoms, limits)
         self._schemas = [
             _Rows(lowering, schema, each) for schema, each in zip(model.schemas.values(), rows, strict=True)
         ]
