@@ -285,7 +285,7 @@ class _Derived:
             )
         above, self._lowest = self._lowest, _DEEPEST_UNFOLDING
         self._depth[key] = depth
-        result = disjunction(self._instances(predicate, row))
+        result = _absorbed(disjunction(self._instances(predicate, row)))
         del self._depth[key]
         if self._lowest >= depth:
             self._known[key] = result
@@ -345,6 +345,18 @@ class _Derived:
     def _not_false(self, condition: Condition) -> Condition:
         """True where the condition is true or unknown, else false or unknown."""
         return disjunction([condition, self._unknown(condition)])
+
+
+def _absorbed(condition: Condition) -> Condition:
+    """Without alternatives that another one makes needless: x or (x and y) is x."""
+    if not isinstance(condition, Or):
+        return condition
+    alternatives = set(condition.parts)
+    return disjunction(
+        part
+        for part in condition.parts
+        if not (isinstance(part, And) and not alternatives.isdisjoint(part.parts))
+    )
 
 
 def extend(env: Env, loops: list[tuple[int, tuple[int, ...]]], spend: Callable[[int], None]) -> Iterator[Env]:

@@ -1,0 +1,204 @@
+"""The shape of ground effects: what is kept apart, what is merged, what they cost."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from bbtc.diagnostics import BbtcError, Report
+from bbtc.ground.describe import describe
+from bbtc.ground.instantiate import ground, instantiate
+from bbtc.ground.task import Factor, GroundAction, Task
+from bbtc.limits import Limits
+from tests.ground.examples import model_of, task_of
+
+_EFFECT = """(define (domain d) (:types t) (:predicates (p) (q) (r) (s ?x - t) (fixed ?x - t))
+  (:functions (total-cost) (length ?x - t)) (:constants a b c - t)
+  (:action act :parameters () :effect {effect})
+  (:action use :precondition (and (p) (q) (r) (s a) (s b) (s c)) :effect (p)))
+(define (problem x) (:domain d) (:init (fixed a) (= (length a) 2.5) {init})
+  (:goal (or (and (p) (q) (r) (s a) (s b) (s c)) (not (p)) (not (q)) (not (r)))) {metric})"""
+
+
+def _task(effect: str, init: str = "", metric: str = "") -> Task:
+    model = model_of(_EFFECT.format(effect=effect, init=init, metric=metric))
+    return instantiate(model, Report(), Limits())
+
+
+def _act(effect: str, init: str = "(p) (q)") -> list[str]:
+    """The factors of ``act``, in words."""
+    task = _task(effect, init)
+    return [_words(task, factor) for factor in task.action_by_name["act()"].factors]
+
+
+def _words(task: Task, factor: Factor) -> str:
+    outcomes = []
+    for outcome in factor.outcomes:
+        effects = []
+        for effect in outcome.effects:
+            sets = " ".join(f"{task.variables[index].name}={value.word}" for index, value in effect.sets)
+            effects.append(sets if effect.when is None else f"[{describe(task, effect.when)}] {sets}")
+        nested = [f"<{_words(task, each)}>" for each in outcome.factors]
+        outcomes.append(f"{outcome.probability}: {'; '.join([*effects, *nested])}".rstrip())
+    return " | ".join(outcomes)
+
+
+def test_what_is_certain_joins_the_only_chance() -> None:
+    assert _act("(and (not (p)) (probabilistic 0.2 (q) 0.8 (not (q))))") == [
+        "1/5: p()=false q()=true | 4/5: p()=false q()=false"
+    ]
+
+
+def test_several_chances_stay_apart() -> None:
+    assert _act("(and (not (p)) (probabilistic 0.2 (not (q))) (probabilistic 0.3 (r)))") == [
+        "1: p()=false",
+        "1/5: q()=false | 4/5:",
+        "3/10: r()=true | 7/10:",
+    ]
+
+
+def test_chance_under_forall_is_a_factor_for_each_object() -> None:
+    assert _act("(forall (?x - t) (probabilistic 0.5 (s ?x)))") == [
+        "1/2: s(a)=true | 1/2:",
+        "1/2: s(b)=true | 1/2:",
+        "1/2: s(c)=true | 1/2:",
+    ]
+
+
+def test_a_static_guard_decides_which_chances_there_are() -> None:
+    assert _act("(forall (?x - t) (when (fixed ?x) (probabilistic 0.5 (s ?x))))") == ["1/2: s(a)=true | 1/2:"]
+
+
+def test_a_guard_moves_into_the_chance() -> None:
+    assert _act("(and (not (q)) (when (q) (probabilistic 0.5 (not (p)) 0.5 (unknown (r)))))") == [
+        "1/2: q()=false; [q()] p()=false | 1/2: q()=false; [q()] r()=unknown"
+    ]
+
+
+def test_a_single_nested_chance_is_multiplied_in() -> None:
+    assert _act("(probabilistic 0.5 (and (not (p)) (probabilistic 0.5 (not (q)))) 0.5 (r))") == [
+        "1/4: p()=false q()=false | 1/4: p()=false | 1/2: r()=true"
+    ]
+
+
+def test_several_nested_chances_stay_nested() -> None:
+    assert _act(
+        "(probabilistic 0.5 (forall (?x - t) (when (fixed ?x) (oneof (s a) (s b)))) 0.5 (not (p)))"
+    ) == ["1/2: <1/2: s(a)=true | 1/2: s(b)=true> | 1/2: p()=false"]
+    assert _act(
+        "(probabilistic 0.5 (and (probabilistic 0.5 (not (p))) (probabilistic 0.5 (r))) 0.5 (s a))"
+    ) == ["1/2: <1/2: p()=false | 1/2:>; <1/2: r()=true | 1/2:> | 1/2: s(a)=true"]
+
+
+def test_equal_outcomes_are_merged_and_impossible_ones_dropped() -> None:
+    assert _act("(probabilistic 0.2 (and (r) (not (p))) 0.3 (and (not (p)) (r)) 0 (q) 0.5 (and))") == [
+        "1/2: p()=false r()=true | 1/2:"
+    ]
+
+
+def test_a_oneof_is_marked_and_counts_as_equally_likely() -> None:
+    task = _task("(oneof (not (p)) (not (q)) (and))", "(p) (q)")
+    (factor,) = task.action_by_name["act()"].factors
+    assert factor.oneof
+    assert [outcome.probability for outcome in factor.outcomes] == [Fraction(1, 3)] * 3
+
+
+def test_true_wins_over_unknown_and_unknown_over_false() -> None:
+    assert _act("(and (p) (not (p)) (unknown (p)) (not (r)) (unknown (r)))") == ["1: p()=true r()=unknown"]
+
+
+def test_rounded_probabilities_become_exact() -> None:
+    third = "0.3333333333333333"
+    (factor,) = _task(f"(probabilistic {third} (p) {third} (q) {third} (r))").action_by_name["act()"].factors
+    assert [outcome.probability for outcome in factor.outcomes] == [Fraction(1, 3)] * 3
+
+
+# --- costs and rewards -----------------------------------------------------------------------
+
+
+def _only(task: Task) -> GroundAction:
+    return task.action_by_name["act()"]
+
+
+def test_costs_come_from_the_effect_and_the_initial_numbers() -> None:
+    action = _only(_task("(and (p) (increase (total-cost) (* 2 (+ (length a) 1/2))))"))
+    assert action.cost == 6
+    assert _task("(and (p) (s b) (s c))", "(q) (r) (s a)").action_by_name["use()"].cost == 0
+
+
+def test_a_branch_may_cost_more() -> None:
+    action = _only(
+        _task("(and (increase (total-cost) 1) (probabilistic 0.5 (and (p) (increase (total-cost) 3))))")
+    )
+    (factor,) = action.factors
+    assert (action.cost, [outcome.cost for outcome in factor.outcomes]) == (1, [3, 0])
+
+
+def test_without_a_cost_fluent_every_action_costs_one() -> None:
+    task = task_of(
+        "(define (domain d) (:predicates (p)) (:action a :effect (p)))"
+        "(define (problem x) (:domain d) (:init) (:goal (p)))"
+    )
+    assert [action.cost for action in task.actions] == [1]
+
+
+def test_rewards_are_kept_by_outcome() -> None:
+    action = _only(
+        _task(
+            "(probabilistic 0.5 (and (p) (increase (reward) 5)) 0.5 (decrease (reward) 1))",
+            "",
+            "(:metric maximize (reward))",
+        )
+    )
+    (factor,) = action.factors
+    assert [outcome.reward for outcome in factor.outcomes] == [5, -1]
+
+
+def test_a_cost_under_a_condition_is_refused_with_its_place() -> None:
+    with pytest.raises(BbtcError) as caught:
+        _task("(and (p) (not (q)) (when (q) (increase (total-cost) 1)))", "(q)")
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == "BBT0409"
+    assert diagnostic.span is not None
+    assert diagnostic.span.text == "(increase (total-cost) 1)"
+
+
+def test_a_missing_number_is_named() -> None:
+    with pytest.raises(BbtcError, match=r"no value for `\(length b\)`"):
+        _task("(and (p) (increase (total-cost) (length b)))")
+
+
+# --- pruning ---------------------------------------------------------------------------------
+
+
+def test_effects_on_what_nothing_reads_are_left_out() -> None:
+    task = task_of(
+        """(define (domain d) (:predicates (p) (noise) (more))
+          (:action a :effect (and (p) (probabilistic 0.5 (noise) 0.3 (more))))
+          (:action b :precondition (noise) :effect (more)))
+        (define (problem x) (:domain d) (:init) (:goal (p)))"""
+    )
+    assert [variable.name for variable in task.variables] == ["p()"]
+    assert [action.name for action in task.actions] == ["a()"]
+    (factor,) = task.actions[0].factors
+    assert [outcome.probability for outcome in factor.outcomes] == [1]
+
+
+def test_static_facts_and_hopeless_actions_are_left_out() -> None:
+    task = task_of(
+        """(define (domain d) (:types t) (:predicates (road ?x ?y - t) (at ?x - t) (broken))
+          (:action go :parameters (?x ?y - t) :precondition (and (at ?x) (road ?x ?y) (not (broken)))
+            :effect (and (at ?y) (not (at ?x)))))
+        (define (problem x) (:domain d) (:objects a b c d - t)
+          (:init (at a) (road a b) (road b a) (road c d)) (:goal (at b)))"""
+    )
+    assert [action.name for action in task.actions] == ["go(a,b)", "go(b,a)"]
+    assert [variable.name for variable in task.variables] == ["at(a)", "at(b)"]
+    assert describe(task, task.actions[0].precondition) == "at(a)"
+
+
+def test_grounding_twice_gives_the_same() -> None:
+    text = _EFFECT.format(effect="(and (p) (q) (r) (s a) (s b) (s c))", init="", metric="")
+    first, second = (ground(model_of(text), Report(), Limits()) for _ in range(2))
+    assert first == second

@@ -1,0 +1,217 @@
+"""Goals that cannot be reached or hold already, initial states, refusals and limits."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bbtc.diagnostics import BbtcError, LimitReached, Report
+from bbtc.ground.condition import evaluate
+from bbtc.ground.describe import describe
+from bbtc.ground.instantiate import ground
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from tests.ground.examples import model_of, task_of
+
+_DOMAIN = """(define (domain d) (:types t) (:predicates (p ?x - t) (q) (r) (on ?x ?y - t) (above ?x ?y - t))
+  (:constants a b c - t)
+  (:action set :parameters (?x - t) :precondition (q) :effect (p ?x))
+  (:action put :parameters (?x ?y - t) :precondition (not (above ?y ?x)) :effect (on ?x ?y))
+  (:action lift :parameters (?x ?y - t) :effect (not (on ?x ?y)))
+  (:derived (above ?x ?y) (or (on ?x ?y) (exists (?z - t) (and (on ?x ?z) (above ?z ?y))))))"""
+
+
+def _text(init: str, goal: str, more: str = "") -> str:
+    return f"{_DOMAIN} (define (problem x) (:domain d) (:init {init}) (:goal {goal}) {more})"
+
+
+def _task(init: str, goal: str, more: str = "") -> Task:
+    return task_of(_text(init, goal, more))
+
+
+def _errors(init: str, goal: str, more: str = "") -> list[tuple[str, str, str | None]]:
+    with pytest.raises(BbtcError) as caught:
+        _task(init, goal, more)
+    return [(d.code, d.span.text if d.span else "", d.hint) for d in caught.value.diagnostics]
+
+
+# --- goals -----------------------------------------------------------------------------------
+
+
+def test_every_unreachable_part_of_the_goal_is_pointed_at() -> None:
+    assert _errors("(q)", "(and (p a) (r) (not (q)))") == [
+        ("BBT0412", "(r)", "no action makes `r` true"),
+        ("BBT0412", "(not (q))", "no action makes `q` false"),
+    ]
+
+
+def test_an_unreachable_goal_names_the_actions_that_could_have_helped() -> None:
+    assert _errors("", "(p a)") == [
+        (
+            "BBT0412",
+            "(p a)",
+            "only `set` could, but cannot apply, or not to these objects: check the preconditions",
+        )
+    ]
+
+
+def test_a_goal_that_holds_already_is_a_warning() -> None:
+    report = Report()
+    task = ground(model_of(_text("(q)", "(q)")), report, Limits())
+    assert [d.code for d in report] == ["BBT0413"]
+    assert task.actions == ()
+
+
+def test_the_goal_may_be_the_preconditions_of_an_action() -> None:
+    task = _task("(unknown (q)) (on a b)", "(and (action put a b) (p b))".replace("(p b)", "(not (on a b))"))
+    assert describe(task, task.goal) == describe(
+        task, _task("", "(and (not (above b a)) (not (on a b)))").goal
+    )
+
+
+# --- derived predicates ----------------------------------------------------------------------
+
+
+def test_a_recursive_derived_predicate_is_unfolded() -> None:
+    task = _task("", "(above a c)")
+    assert describe(task, task.goal) == "(on(a,c) or (on(a,b) and on(b,c)))"
+
+
+@given(st.lists(st.sampled_from(list(Truth)), min_size=9, max_size=9))
+def test_a_derived_atom_has_the_value_of_the_least_fixpoint(values: list[Truth]) -> None:
+    task = _task(" ".join(f"(unknown (on {x} {y}))" for x in "abc" for y in "abc"), "(above a c)")
+    pairs = [(x, y) for x in "abc" for y in "abc"]
+    on = dict(zip(pairs, values, strict=True))
+    above = dict.fromkeys(pairs, Truth.FALSE)
+    for _ in range(9):
+        above = {(x, y): max(on[x, y], max(min(on[x, z], above[z, y]) for z in "abc")) for x, y in pairs}
+    state = [on[v.args[0], v.args[1]] for v in task.variables]
+    assert evaluate(task.goal, state) is above["a", "c"]
+
+
+# --- initial states --------------------------------------------------------------------------
+
+
+def test_a_probabilistic_start_is_spelled_out() -> None:
+    task = _task(
+        "(q) (probabilistic 0.25 (p a) 0.25 (on a b)) (probabilistic 0.5 (p a))", "(and (p a) (on a b))"
+    )
+    states = {
+        tuple(
+            v.name for v, value in zip(task.variables, state.values, strict=True) if value is Truth.TRUE
+        ): state
+        for state in task.initial
+    }
+    assert {names: state.probability for names, state in states.items()} == {
+        (): Fraction(1, 4),
+        ("p(a)",): Fraction(1, 2),
+        ("on(a,b)",): Fraction(1, 8),
+        ("on(a,b)", "p(a)"): Fraction(1, 8),
+    }
+
+
+@pytest.mark.parametrize(
+    ("init", "code", "place"),
+    [
+        ("(oneof (p a) (p b))", "BBT0404", "(oneof (p a) (p b))"),
+        ("(or (p a) (p b))", "BBT0405", "(or (p a) (p b))"),
+        (
+            " ".join(
+                f"(probabilistic 0.5 (on {x} {y}) 0.25 (unknown (on {x} {y})))" for x in "abc" for y in "abc"
+            ),
+            "BBT0403",
+            "(probabilistic 0.5 (on b c) 0.25 (unknown (on b c)))",
+        ),
+    ],
+)
+def test_starts_that_cannot_be_grounded_yet_are_refused_by_name(init: str, code: str, place: str) -> None:
+    assert [each[:2] for each in _errors(f"(q) {init}", "(p a)")] == [(code, place)]
+
+
+def test_observations_are_refused_by_name() -> None:
+    text = """(define (domain d) (:predicates (p)) (:action look :observe (p)) (:action a :effect (p)))
+        (define (problem x) (:domain d) (:init) (:goal (p)))"""
+    with pytest.raises(BbtcError) as caught:
+        task_of(text)
+    assert [d.code for d in caught.value.diagnostics] == ["BBT0406"]
+
+
+def test_a_metric_alone_is_no_goal() -> None:
+    text = """(define (domain d) (:predicates (p)) (:action a :effect (and (p) (increase (reward) 1))))
+        (define (problem x) (:domain d) (:init) (:metric maximize (reward)))"""
+    with pytest.raises(BbtcError) as caught:
+        task_of(text)
+    assert [d.code for d in caught.value.diagnostics] == ["BBT0411"]
+
+
+# --- limits ----------------------------------------------------------------------------------
+
+
+def _wide(parameters: int, objects: int) -> str:
+    names = " ".join(f"?p{i}" for i in range(parameters))
+    return (
+        f"(define (domain d) (:predicates (p) (q ?x ?y ?z)) (:action wide :parameters ({names}) :effect (p))"
+        " (:action all :precondition (p) :effect (forall (?x ?y ?z) (q ?x ?y ?z))))"
+        f"(define (problem x) (:domain d) (:objects {' '.join(f'o{i}' for i in range(objects))})"
+        " (:init) (:goal {goal}))"
+    )
+
+
+def test_twelve_parameters_over_a_thousand_objects_meet_the_limit() -> None:
+    with pytest.raises(LimitReached, match="limit of 50000 ground actions"):
+        task_of(_wide(12, 1000).replace("{goal}", "(p)"), Limits(actions=50_000))
+
+
+def test_a_quantified_effect_over_a_thousand_objects_meets_the_limit() -> None:
+    with pytest.raises(LimitReached, match="derived facts"):
+        task_of(_wide(1, 1000).replace("{goal}", "(p)"), Limits(facts=100_000))
+
+
+def test_a_quantified_goal_over_a_thousand_objects_meets_the_limit() -> None:
+    goal = "(and (p) (not (exists (?x ?y ?z) (and (= ?x ?y) (not (= ?x ?y))))))"
+    with pytest.raises(LimitReached, match="quantifier bindings"):
+        task_of(
+            _wide(1, 1000).replace("(forall (?x ?y ?z) (q ?x ?y ?z))", "(p)").replace("{goal}", goal),
+            Limits(bindings=10**6),
+        )
+
+
+def test_time_is_bounded() -> None:
+    with pytest.raises(LimitReached, match="time limit"):
+        task_of(_wide(12, 1000).replace("{goal}", "(p)"), Limits(seconds=0.5))
+
+
+# --- names -----------------------------------------------------------------------------------
+
+
+def test_actions_and_variables_are_sorted_by_name() -> None:
+    names = ["a", "a-b", "a_b", "ab", "a0", "a+", "a*b", "b"]
+    text = f"""(define (domain d) (:predicates (p ?x ?y)) (:constants {" ".join(names)})
+        (:action one :parameters (?x ?y) :effect (p ?x ?y))
+        (:action one-more :parameters (?x) :effect (p ?x ?x)))
+        (define (problem x) (:domain d) (:init) (:goal (forall (?x ?y) (p ?x ?y))))"""
+    task = task_of(text)
+    actions, variables = [a.name for a in task.actions], [v.name for v in task.variables]
+    assert (len(actions), len(variables)) == (72, 64)
+    assert (actions, variables) == (sorted(actions), sorted(variables))
+
+
+def test_large_tasks_are_grounded_like_small_ones() -> None:
+    """Past some size another process runs the Datalog program: 40 places on a ring."""
+    places = [f"c{i}" for i in range(40)]
+    roads = " ".join(f"(road {x} {y})" for x, y in zip(places, places[1:] + places[:1], strict=True))
+    things = [f"t{i}" for i in range(20)]
+    facts = " ".join(f"(at {thing} c{i})" for i, thing in enumerate(things))
+    text = f"""(define (domain d) (:types place thing)
+        (:predicates (road ?x ?y - place) (at ?t - thing ?x - place))
+        (:action move :parameters (?t - thing ?x ?y - place) :precondition (and (at ?t ?x) (road ?x ?y))
+          :effect (and (not (at ?t ?x)) (at ?t ?y))))
+        (define (problem x) (:domain d)
+          (:objects {" ".join(places)} - place {" ".join(things)} - thing)
+          (:init {roads} {facts}) (:goal (at t0 c7)))"""
+    task = task_of(text)
+    assert (len(task.actions), len(task.variables)) == (40, 40)
