@@ -13,6 +13,7 @@ from bbtc.plan.result import Plan, Progress, Strategy
 
 STRATEGIES = {
     "refine": ("bbtc.plan.refine", "refine"),
+    "policy": ("bbtc.plan.policy", "plan_policy"),
 }
 """Module and function of each strategy, imported when used."""
 

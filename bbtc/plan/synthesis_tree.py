@@ -1,0 +1,164 @@
+"""From rules to a readable tree: ``Fallback(goal, Sequence(tests…, action), …)``.
+
+Where the goal can be unknown, its rules stand under a Skipper: ``Fallback(Skipper(goal, rules for
+unknown), rules for false…)``. Neighbouring rules for one action share its node, and neighbours that
+share a test stand under it together, where that saves nodes. Actions are not latched: a rule that
+applies again tries again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from bbtc.ground.condition import Condition, compile_condition, conjuncts
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.plan.policy_space import Offers
+from bbtc.plan.space_actions import Index
+from bbtc.plan.space_packing import Flags
+from bbtc.plan.synthesis_rules import Learner, Literal, Rule, Test
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
+
+
+def synthesize(task: Task, offers: Offers, limits: Limits) -> Node:
+    """A tree that takes one of the offers in every state a run visits, and otherwise fails.
+    Raises ``LimitReached`` when the time is over."""
+    goal = _truths(task.goal, offers.values)
+    unknown: Flags = goal == Truth.UNKNOWN
+    false: Flags = goal == Truth.FALSE
+    nowhere = np.zeros_like(unknown)
+    learner = Learner(task, offers, limits)
+    ending = np.diff(offers.first) == 0
+    watching = learner.learn(unknown, nowhere)
+    acting = learner.learn(false, unknown & ending)
+    node = _goal_node(task, offers.values[learner.relevant()])
+    build = _Builder(task, offers.values)
+    if watching:
+        node = _control("skipper", [node, build.choice(build.rules(watching))])
+    children = build.rules(acting)
+    return numbered(_control("fallback", [node, *children]) if children else node)
+
+
+def numbered(root: Node) -> Node:
+    """The tree with ids ``n1``, ``n2``, … from the root down, from left to right."""
+    count = 0
+
+    def visit(node: Node) -> Node:
+        nonlocal count
+        count += 1
+        node = replace(node, id=f"n{count}")
+        if isinstance(node, ControlNode):
+            return replace(node, children=tuple([visit(child) for child in node.children]))
+        return node
+
+    return visit(root)
+
+
+def _truths(condition: Condition, values: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+    test = compile_condition(condition)
+    return np.array([int(test(row)) for row in values.tolist()], dtype=np.int64)
+
+
+def _goal_node(task: Task, values: npt.NDArray[np.uint8]) -> Node:
+    """The goal, a node for each of its parts unless some part may be unknown: in a Sequence, an
+    unknown part would hide a false one behind it."""
+    parts = conjuncts(task.goal)
+    if len(parts) < 2 or any((_truths(part, values) == Truth.UNKNOWN).any() for part in parts):
+        return ConditionNode("", task.goal)
+    return _control("sequence", [ConditionNode("", part) for part in parts])
+
+
+def _control(kind: ControlKind, children: Sequence[Node]) -> Node:
+    return children[0] if len(children) == 1 else ControlNode("", kind, tuple(children))
+
+
+def _size(nodes: Sequence[Node]) -> int:
+    return sum(1 for node in nodes for _ in walk(node))
+
+
+@dataclass(frozen=True, slots=True)
+class _Builder:
+    task: Task
+    values: npt.NDArray[np.uint8]
+
+    def choice(self, children: list[Node]) -> Node:
+        return _control("fallback", children)
+
+    def rules(self, rules: Sequence[Rule]) -> list[Node]:
+        """The rules as children of a Fallback, in order."""
+        best = self._flat(rules)
+        for literal, start, end in self._shared(rules):
+            inner = [replace(r, tests=tuple(t for t in r.tests if t != literal)) for r in rules[start:end]]
+            if not self._settled([literal], rules[start].asked):
+                continue
+            asked = rules[start].asked[literal.holds(self.values[rules[start].asked])]
+            inner[0] = replace(inner[0], asked=asked)
+            branch = _control(
+                "sequence", [ConditionNode("", literal.condition), self.choice(self.rules(inner))]
+            )
+            nodes = [*self.rules(rules[:start]), branch, *self.rules(rules[end:])]
+            if _size(nodes) < _size(best):
+                best = nodes
+                break
+        return best
+
+    def _shared(self, rules: Sequence[Rule]) -> list[tuple[Literal, int, int]]:
+        """Runs of neighbouring rules that share a test, the longest first."""
+        found: list[tuple[Literal, int, int]] = []
+        for literal in sorted({test for rule in rules for test in rule.tests}):
+            start = None
+            for position in range(len(rules) + 1):
+                inside = position < len(rules) and literal in rules[position].tests
+                if inside and start is None:
+                    start = position
+                elif not inside and start is not None:
+                    if position - start > 1:
+                        found.append((literal, start, position))
+                    start = None
+        return sorted(found, key=lambda run: (run[1] - run[2], run[0]))
+
+    def _flat(self, rules: Sequence[Rule]) -> list[Node]:
+        nodes: list[Node] = []
+        position = 0
+        while position < len(rules):
+            rule = rules[position]
+            alike = [rule]
+            while position + len(alike) < len(rules) and rules[position + len(alike)].action == rule.action:
+                alike.append(rules[position + len(alike)])
+            action = ActionNode("", self.task.actions[rule.action].name, latched=False)
+            if all(each.tests for each in alike) and len(alike) > 1:
+                tests = [_control("sequence", self._conditions(each)) for each in alike]
+                nodes.append(_control("sequence", [self.choice(tests), action]))
+            else:
+                nodes.extend(_control("sequence", [*self._conditions(each), action]) for each in alike)
+            position += len(alike)
+        return nodes
+
+    def _conditions(self, rule: Rule) -> list[Node]:
+        """The tests of a rule, in an order in which none is ever unknown; where there is no such
+        order, ``known`` tests come before."""
+        waiting = list(rule.tests)
+        asked = rule.asked
+        nodes: list[Node] = []
+        while waiting:
+            literal = next((t for t in waiting if self._settled([t], asked)), None)
+            if literal is None:
+                literal = Literal(waiting[0].variable, Test.KNOWN)
+            else:
+                waiting.remove(literal)
+            nodes.append(ConditionNode("", literal.condition))
+            asked = asked[literal.holds(self.values[asked])]
+        return nodes
+
+    def _settled(self, tests: Sequence[Literal], asked: Index) -> bool:
+        """Is none of the tests unknown in any of the states?"""
+        return all(
+            test.test in {Test.UNKNOWN, Test.KNOWN}
+            or not (self.values[asked, test.variable] == Truth.UNKNOWN).any()
+            for test in tests
+        )
