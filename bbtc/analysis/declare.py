@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TypeVar
 
 from bbtc.analysis.names import Declared, Names, Signature
@@ -29,12 +30,13 @@ def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None
     _predicates(names, domain)
     _functions(names, domain)
     _fluents(names, problem)
-    for action in sections(domain, ast.Action):
-        names.section = f"action {action.name.key}"
-        _sign(names, names.actions, "action", action)
+    _actions(names, list(sections(domain, ast.Action)))
     for template in sections(domain, ast.Template):
         names.section = f"template {template.name.key}"
-        _sign(names, names.templates, "template", template)
+        signature = _signature(names, template)
+        before = names.templates.setdefault(template.name.key, signature)
+        if before is not signature:
+            twice(names.report, "template", template.name, before)
         first = names.actions.get(template.name.key)
         if first is not None:
             twice(
@@ -43,12 +45,19 @@ def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None
 
 
 def twice(
-    report: Report, kind: str, name: ast.Term, first: Declared, *, other: str = "", harmless: bool = False
+    report: Report,
+    kind: str,
+    name: ast.Term,
+    first: Declared,
+    *,
+    other: str = "",
+    hint: str | None = None,
+    harmless: bool = False,
 ) -> None:
-    """Report a name declared before; only a warning where both declarations say the same."""
+    """Report a name declared before; only a warning where that does no harm."""
     clash = f"{kind} `{name.text}` " + (f"has the name of {other}" if other else "is declared twice")
     add = report.warning if harmless else report.error
-    add("BBT0208", clash, name.span, related=[Related("first declared here", first.span)])
+    add("BBT0208", clash, name.span, hint, [Related("first declared here", first.span)])
 
 
 # --- types -----------------------------------------------------------------------------------
@@ -63,7 +72,11 @@ def _types(names: Names, domain: ast.Definition) -> TypeHierarchy:
                 for name in group.names:
                     found.setdefault(name.key, Type(name.key, (), name.span))
                     above = parents.setdefault(name.key, {})
-                    above.update((parent.key, parent) for parent in group.types if parent.key != name.key)
+                    for parent in group.types:
+                        if parent.key != name.key:
+                            above[parent.key] = parent
+                        elif name.key != OBJECT:
+                            _refuse_own_parent(names, group, name)
     # A supertype need not be declared itself: `car - vehicle` is read as declaring both.
     for above in list(parents.values()):
         for key, parent in above.items():
@@ -101,6 +114,17 @@ def _implied(names: Names, domain: ast.Definition, found: dict[str, Type]) -> No
                     name.span,
                     "the domain has no `:types`, so every type that it uses is taken as one",
                 )
+
+
+def _refuse_own_parent(names: Names, group: ast.TypedGroup, name: ast.Term) -> None:
+    others = ", ".join(f"`{each.text}`" for each in group.names if each is not name)
+    names.report.error(
+        "BBT0209",
+        f"type `{name.text}` is its own supertype: {name.text} - {name.text}",
+        name.span,
+        "every name before the `-` gets the type after it"
+        + (f": if only {others} should, put `{name.text}` behind them" if others else ""),
+    )
 
 
 def _refuse_cycles(names: Names, parents: dict[str, dict[str, ast.Name]], found: dict[str, Type]) -> None:
@@ -205,8 +229,25 @@ def _fluents(names: Names, problem: ast.Definition | None) -> None:
     names.costs, names.rewards = frozenset(costs), frozenset(rewards)
 
 
-def _sign(names: Names, into: dict[str, Signature], kind: str, node: ast.Action | ast.Template) -> None:
-    signature = Signature(node.name.key, names.parameters(node.parameters), node.name.span)
-    before = into.setdefault(node.name.key, signature)
-    if before is not signature:
-        twice(names.report, kind, node.name, before)
+def _actions(names: Names, nodes: list[ast.Action]) -> None:
+    """Every action, in source order. Some public domains give several the same name: the later
+    ones get a number."""
+    taken = {node.name.key for node in nodes}
+    for node in nodes:
+        key = node.name.key
+        names.section = f"action {key}"
+        signature = _signature(names, node)
+        before = names.actions.get(key)
+        if before is not None:
+            number = 2
+            while f"{key}-{number}" in taken:
+                number += 1
+            signature = replace(signature, name=f"{key}-{number}")
+            taken.add(signature.name)
+            hint = f"this one is called `{signature.name}` from here on"
+            twice(names.report, "action", node.name, before, hint=hint, harmless=True)
+        names.actions[signature.name] = signature
+
+
+def _signature(names: Names, node: ast.Action | ast.Template) -> Signature:
+    return Signature(node.name.key, names.parameters(node.parameters), node.name.span)

@@ -11,7 +11,7 @@ from typing_extensions import assert_never
 from bbtc.analysis import bodies, formulas
 from bbtc.analysis.declare import declare, sections
 from bbtc.analysis.initial import initial
-from bbtc.analysis.names import Names
+from bbtc.analysis.names import Names, Signature
 from bbtc.diagnostics import Related, Report
 from bbtc.kleene import Truth
 from bbtc.model import domain as md
@@ -36,9 +36,9 @@ def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Repo
     _check_sections(report, domain, problem)
     declare(names, domain, problem)
     schemas: dict[str, md.Schema] = {}
-    for action in sections(domain, ast.Action):
-        names.section = f"action {action.name.key}"
-        schemas.setdefault(action.name.key, _schema(names, action))
+    for signature, action in zip(names.actions.values(), sections(domain, ast.Action), strict=True):
+        names.section = f"action {signature.name}"
+        schemas[signature.name] = _schema(names, signature, action)
     rules = tuple(_rule(names, node) for node in sections(domain, ast.Derived))
     _check_stratified(names, rules)
     sensors = tuple(_sensor(names, node) for node in sections(domain, ast.Sensor))
@@ -107,9 +107,8 @@ def _scope(parameters: tuple[Parameter, ...]) -> dict[str, Parameter]:
     return {parameter.name: parameter for parameter in parameters}
 
 
-def _schema(names: Names, node: ast.Action) -> md.Schema:
-    parameters = names.actions[node.name.key].parameters
-    scope = _scope(parameters)
+def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
+    scope = _scope(signature.parameters)
     observe: mf.Formula | me.Choice | None = None
     if node.observe is not None:
         content = node.observe.content
@@ -118,8 +117,8 @@ def _schema(names: Names, node: ast.Action) -> md.Schema:
         else:
             observe = formulas.formula(names, content, scope)
     return md.Schema(
-        node.name.key,
-        parameters,
+        signature.name,
+        signature.parameters,
         mf.ALWAYS if node.precondition is None else formulas.formula(names, node.precondition, scope),
         me.NOTHING if node.effect is None else formulas.effect(names, node.effect, scope),
         observe,

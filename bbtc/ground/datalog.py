@@ -19,6 +19,8 @@ from bbtc.ground.universe import Row
 from bbtc.limits import Limits
 
 _CHUNK = 1 << 20
+_OUT_OF_MEMORY = 33
+"""The exit status of clingo for it."""
 
 
 def derive(
@@ -55,9 +57,10 @@ def _in_process(program: Sequence[str], outputs: Mapping[str, int]) -> dict[str,
 
 # --- the child process -----------------------------------------------------------------------
 
+# The child sees the packages that we see, and nothing from the folder it starts in.
 _CHILD = """
-import sys
-memory = int(sys.argv[1])
+import json, sys
+program, memory, sys.path[:] = sys.argv[1], int(sys.argv[2]), json.loads(sys.argv[3])
 if memory:
     try:
         import resource
@@ -65,7 +68,7 @@ if memory:
     except (ImportError, ValueError, OSError):
         pass
 from clingo.application import Application, clingo_main
-clingo_main(Application(), ["--mode=gringo", "--text", "--warn=none", sys.argv[2]])
+sys.exit(clingo_main(Application(), ["--mode=gringo", "--text", "--warn=none", program]))
 """
 
 
@@ -76,7 +79,8 @@ def _in_child(
     with tempfile.TemporaryDirectory(prefix="bbtc-") as folder:
         path = Path(folder, "program.lp")
         path.write_text("\n".join(program), encoding="ascii")
-        command = [sys.executable, "-I", "-c", _CHILD, str(limits.memory or 0), str(path)]
+        arguments = [str(path), str(limits.memory or 0), json.dumps(sys.path)]
+        command = [sys.executable, "-I", "-c", _CHILD, *arguments]
         # Our own interpreter and our own program text: nothing of the input is a command.
         process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -92,10 +96,12 @@ def _in_child(
                 timer.cancel()
             process.kill()
             process.communicate()
-    if process.returncode not in (0, 10, 20, 30):
-        limits.check_time("grounding")
+    if process.returncode == 0:
+        return rows
+    limits.check_time("grounding")
+    if process.returncode < 0 or process.returncode == _OUT_OF_MEMORY:
         raise limits.reached("the memory limit ended grounding", "--max-memory")
-    return rows
+    raise RuntimeError(f"the Datalog engine failed with status {process.returncode}")
 
 
 def _collect(
@@ -134,5 +140,4 @@ def _blocks(descriptor: int) -> Iterator[list[bytes]]:
         lines = (rest + chunk).split(b"\n")
         rest = lines.pop()
         yield lines
-    if rest:
-        yield [rest]
+    # A line without its end was cut off by a limit.
