@@ -38,6 +38,12 @@ from bbtc.tree.nodes import Tree, walk
 PATIENCE = 30
 """So many refinements may pass without progress before they are taken back."""
 
+PROGRESS = Fraction(1, 1000)
+"""Progress closes at least this share of the gap to the target."""
+
+KEPT_PROMISE = Fraction(1, 100)
+"""A template that brings less than this share of what its guide promised is not inserted there again."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Change:
@@ -110,7 +116,20 @@ class _Refiner:
 
         return undo
 
-    def retreat(self, changes: list[_Change], best: Simulated) -> Refinement | None:
+    def judge(self, change: _Change, gain: Fraction) -> None:
+        """Bar a template that could run at once and brought next to nothing of what its guide
+        promised."""
+        done = change.refinement
+        promised = done.probability * done.chance
+        if (
+            change.insertion is not None
+            and change.insertion[2] in self.task.template_by_name
+            and not done.unmet
+            and gain < promised * KEPT_PROMISE
+        ):
+            self.finder.banned.add(change.insertion)
+
+    def retreat(self, changes: list[_Change], base: Simulated) -> Refinement | None:
         """Take back refinements that brought nothing, and bar the first insertion among them."""
         for change in reversed(changes):
             change.undo()
@@ -119,7 +138,7 @@ class _Refiner:
             return None
         self.finder.banned.add(first.insertion)
         return replace(
-            first.refinement, kind="retreat", success=best.success, nodes=_size(best), taken_back=len(changes)
+            first.refinement, kind="retreat", success=base.success, nodes=_size(base), taken_back=len(changes)
         )
 
 
@@ -136,9 +155,9 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
     refinements: list[Refinement] = []
     status: PlanStatus = "stuck"
     stop: Diagnostic | None = None
-    best = current = refiner.simulate()
+    best = base = current = refiner.simulate()  # the base: where progress was last made
     initial = current.success
-    since_best: list[_Change] = []
+    since_base: list[_Change] = []
 
     def tell(refinement: Refinement) -> None:
         refinements.append(refinement)
@@ -146,22 +165,25 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
 
     try:
         while best.success < target:
-            change = refiner.refine_once(current) if len(since_best) < PATIENCE else None
+            change = refiner.refine_once(current) if len(since_base) < PATIENCE else None
             if change is None:
-                if not since_best:
+                if not since_base:
                     break
-                retreat = refiner.retreat(since_best, best)
-                since_best, current = [], best
+                retreat = refiner.retreat(since_base, base)
+                since_base, current = [], base
                 if retreat is not None:
                     tell(retreat)
                 continue
             before, current = current, refiner.simulate()
             tell(replace(change.refinement, success=current.success, nodes=_size(current)))
-            since_best.append(change)
-            if (current.success, current.goals) > (best.success, best.goals):
-                best, since_best = current, []
+            since_base.append(change)
+            refiner.judge(change, current.success - before.success)
+            if current.success > best.success:
+                best = current
+            if _progress(base, current, target):
+                base, since_base = current, []
             elif change.insertion is None and current.success < before.success:
-                since_best.pop().undo()  # a move that harms; its pair is not moved again
+                since_base.pop().undo()  # a move that harms; its pair is not moved again
                 current = before
     except LimitReached as reached:
         status, stop = "limit-reached", reached.diagnostics[0]
@@ -172,6 +194,13 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
     root = without_idle_branches(task, best.root, best.chain)
     figures = simulate(task, root, limits) if root is not best.root else chain_figures(task, root, best.chain)
     return Plan(Tree(task, root, best.success, target, status), figures, initial, tuple(refinements), stop)
+
+
+def _progress(base: Simulated, now: Simulated, target: Fraction) -> bool:
+    gap = target - base.success
+    return now.success - base.success >= gap * PROGRESS or (
+        now.success == base.success and now.goals > base.goals
+    )
 
 
 def _size(simulated: Simulated) -> int:
