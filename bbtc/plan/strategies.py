@@ -14,6 +14,7 @@ from bbtc.plan.result import Plan, Progress, Strategy
 STRATEGIES = {
     "refine": ("bbtc.plan.refine", "refine"),
     "policy": ("bbtc.plan.policy", "plan_policy"),
+    "auto": ("bbtc.plan.auto", "plan_auto"),
 }
 """Module and function of each strategy, imported when used."""
 

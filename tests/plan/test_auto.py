@@ -1,0 +1,67 @@
+"""The strategy `auto`: the better of what the others find."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from bbtc.ground.condition import Is
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.pipeline import plan_task
+from bbtc.plan.result import Plan, Refinement
+from bbtc.tree.nodes import walk
+from tests.domains.problems import PROBLEMS, Problem, task_of
+from tests.plan.test_refine import action, task
+from tests.strategies import tasks
+
+T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
+
+
+def plan(of: Task, strategy: str, target: str | None = None, steps: list[Refinement] | None = None) -> Plan:
+    wanted = None if target is None else Fraction(target)
+    told: list[Refinement] = []
+    done = plan_task(of, wanted, strategy, Limits(states=5000, nodes=200), told.append)
+    if steps is not None:
+        steps.extend(told)
+    return done
+
+
+def size(of: Plan) -> int:
+    return sum(1 for _ in walk(of.tree.root))
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks())
+def test_auto_is_no_worse_than_the_other_strategies(of: Task) -> None:
+    auto = plan(of, "auto", "0.9")
+    for other in (plan(of, "refine", "0.9"), plan(of, "policy", "0.9")):
+        assert auto.tree.success_probability >= min(other.tree.success_probability, Fraction("0.9"))
+        if other.tree.status == "target-reached":
+            assert size(auto) <= size(other)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
+    of = task_of(problem)
+    done = plan(of, "auto")
+    assert done.tree.status == "target-reached"
+    assert size(done) <= min(40, size(plan(of, "refine")))
+
+
+def test_refinements_are_told_only_if_their_tree_is_kept() -> None:
+    """One action does it: refinement needs a latch and a check more than the policy."""
+    steps: list[Refinement] = []
+    once = action("once", Is(0, F), ("1", {0: T}))
+    done = plan(task("a", {}, Is(0, T), once), "auto", "1", steps)
+    assert (len(done.refinements), steps) == (0, [])
+
+
+def test_what_is_out_of_reach_is_said_with_the_best_tree() -> None:
+    once = action("try", Is(1, T), ("0.5", {0: T, 1: F}), ("0.5", {1: F}))
+    done = plan(task("goal available", {1: T}, Is(0, T), once), "auto", "0.9")
+    assert (done.tree.status, done.tree.bounds) == ("out-of-reach", (Fraction(1, 2), Fraction(1, 2)))
+    assert done.tree.success_probability == Fraction(1, 2)
