@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
@@ -23,8 +23,25 @@ def _span() -> Span:
 # --- names, numbers, terms -------------------------------------------------------------------
 
 
+class _Placed:
+    """A word that knows where it starts, and makes its span when asked: a large file has a million
+    words, and nearly nobody asks. Nodes made with a span keep that."""
+
+    __slots__ = ("_source", "_start")
+    _source: SourceFile
+    _start: int
+    text: str
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Span:
+            if name != "span":
+                raise AttributeError(name)
+            return Span(self._source, self._start, self._start + len(self.text))
+
+
 @dataclass(frozen=True, slots=True)
-class Name:
+class Name(_Placed):
     """A symbol as written."""
 
     text: str
@@ -37,7 +54,7 @@ class Name:
 
 
 @dataclass(frozen=True, slots=True)
-class Variable:
+class Variable(_Placed):
     """A parameter, question mark included."""
 
     text: str

@@ -10,7 +10,7 @@ from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax import ast, leaves
 from bbtc.syntax.engine import Token
-from bbtc.syntax.hints import CONNECTIVES, nearest
+from bbtc.syntax.hints import CONNECTIVES, NOT_IN_EFFECT, nearest
 from bbtc.syntax.leaves import SOURCE, Misuse, between, of
 
 _WORD = re.compile(r"\??[^\s()?]+")
@@ -149,7 +149,7 @@ class Builder:
                 groups.append(ast.TypedGroup(names, types, Span(span.source, names[0].span.start, span.end)))
                 names = ()
             elif child.kind.startswith("TYPED"):
-                groups.extend(leaves.groups(child))
+                groups.extend(leaves.groups(child.text, child.start))
             else:
                 names += tuple(leaves.terms(child.text, child.start, SOURCE.get()))
         if names:
@@ -157,6 +157,13 @@ class Builder:
         return tuple(groups)
 
     typed_variables = typed_names
+
+    def variable_list(self, children: list[Any]) -> ast.TypedList:
+        return children[1]  # type: ignore[no-any-return]
+
+    def variables_flat(self, children: list[Any]) -> ast.TypedList:
+        token = children[0]
+        return tuple(leaves.groups(token.text[1:-1], token.start + 1))
 
     def type(self, children: list[Any]) -> tuple[tuple[ast.Name, ...], Span]:
         return (leaves.name(children[1]),), between(children[0], children[1])
@@ -175,6 +182,15 @@ class Builder:
     def predicate(self, children: list[Any]) -> ast.PredicateDeclaration:
         head, parameters, close = children
         return ast.PredicateDeclaration(_head_name(head), parameters, False, between(head, close))
+
+    def predicate_flat(self, children: list[Any]) -> ast.PredicateDeclaration:
+        token = children[0]
+        found = _WORD.search(token.text, 1)
+        assert found is not None
+        start = token.start + found.start()
+        name = ast.Name(found.group(), Span(SOURCE.get(), start, start + len(found.group())))
+        entries = leaves.groups(token.text[found.end() : -1], token.start + found.end())
+        return ast.PredicateDeclaration(name, tuple(entries), False, of(token))
 
     def predicate_unknown(self, children: list[Any]) -> ast.PredicateDeclaration:
         unknown, head, parameters, _, close = children
@@ -233,7 +249,7 @@ class Builder:
         )
 
     def parameters(self, children: list[Any]) -> Field:
-        return Field("parameters", children[0], children[2])
+        return Field("parameters", *children)
 
     def precondition(self, children: list[Any]) -> Field:
         return Field("precondition", *children)
@@ -278,7 +294,7 @@ class Builder:
         )
 
     def axiom_parameters(self, children: list[Any]) -> Field:
-        return Field("parameters", children[0], children[2])
+        return Field("parameters", *children)
 
     def axiom_context(self, children: list[Any]) -> Field:
         return Field("context", *children)
@@ -372,6 +388,19 @@ class Builder:
     def conjunction(self, children: list[Any]) -> ast.And:
         return ast.And(tuple(children[1:-1]), between(children[0], children[-1]))
 
+    def literals(self, children: list[Any]) -> ast.And:
+        return ast.And(tuple(leaves.literals(children[0])), of(children[0]))
+
+    def equation(self, children: list[Any]) -> ast.Equality:
+        token: Token = children[0]
+        return leaves.equation(token.text, token.start)
+
+    def unequal(self, children: list[Any]) -> ast.Not:
+        token = children[0]
+        start = token.text.index("(", 1)
+        inner = token.text[start : token.text.index(")") + 1]
+        return ast.Not(leaves.equation(inner, token.start + start), of(token))
+
     def disjunction(self, children: list[Any]) -> ast.Or:
         return ast.Or(tuple(children[1:-1]), between(children[0], children[-1]))
 
@@ -380,7 +409,7 @@ class Builder:
         return ast.Imply(premise, conclusion, between(head, close))
 
     def quantified(self, children: list[Any]) -> ast.Quantified:
-        head, _, parameters, _, part, close = children
+        head, parameters, part, close = children
         kind: Any = _keyword(head)
         return ast.Quantified(kind, _parameters(parameters, close), part, between(head, close))
 
@@ -432,12 +461,24 @@ class Builder:
     def effect_and(self, children: list[Any]) -> ast.EffectAnd:
         return ast.EffectAnd(tuple(children[1:-1]), between(children[0], children[-1]))
 
+    def effect_literals(self, children: list[Any]) -> ast.EffectAnd:
+        parts: list[ast.Effect] = []
+        for literal in leaves.literals(children[0]):
+            match literal:
+                case ast.Atom():
+                    parts.append(leaves.assign(literal, Truth.TRUE, literal.span))
+                case ast.Not(ast.Atom() as atom):
+                    parts.append(leaves.assign(atom, Truth.FALSE, literal.span))
+                case _:
+                    raise Misuse("BBT0101", "an effect cannot say `=`", literal.span, NOT_IN_EFFECT["="])
+        return ast.EffectAnd(tuple(parts), of(children[0]))
+
     def when(self, children: list[Any]) -> ast.When:
         head, condition, effect, close = children
         return ast.When(condition, effect, between(head, close))
 
     def effect_forall(self, children: list[Any]) -> ast.EffectForall:
-        head, _, parameters, _, effect, close = children
+        head, parameters, effect, close = children
         return ast.EffectForall(_parameters(parameters, close), effect, between(head, close))
 
     def probabilistic(self, children: list[Any]) -> ast.Probabilistic:
@@ -492,7 +533,7 @@ class Builder:
         return ast.BodyCondition(formula, between(head, close))
 
     def body_foreach(self, children: list[Any]) -> ast.BodyForeach:
-        head, _, parameters, _, child, close = children
+        head, parameters, child, close = children
         return ast.BodyForeach(_parameters(parameters, close), child, between(head, close))
 
     def body_action(self, children: list[Any]) -> ast.BodyCall:

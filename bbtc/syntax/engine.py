@@ -8,6 +8,7 @@ which takes three times as long as the loop below; and planning files come in me
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
@@ -75,6 +76,10 @@ class Unexpected(Exception):
         self.position, self.stack = position, stack
 
 
+class TooDeep(Exception):
+    """The stack of states is higher than allowed."""
+
+
 def make_tables(grammar: str, start: str) -> Tables:
     """The automaton of a Lark grammar."""
     lark = Lark(grammar, parser="lalr", lexer="contextual", start=start, g_regex_flags=_FLAGS)
@@ -137,8 +142,12 @@ class Engine:
         self._scanners: dict[int, _Scanner] = {}
         self._compiled: dict[frozenset[str], _Scanner] = {}
 
-    def parse(self, text: str) -> Any:
-        """The value of the start rule for a text. Raises :class:`Unexpected`."""
+    def parse(self, text: str, max_stack: int = sys.maxsize) -> Any:
+        """The value of the start rule for a text.
+
+        Raises :class:`Unexpected` for a syntax error, and :class:`TooDeep` where the stack of states
+        would exceed ``max_stack``. Every form that is open takes at least one state.
+        """
         actions, goto, reductions, scanners = self._actions, self._goto, self._reductions, self._scanners
         make: Any = tuple.__new__
         state, end = self._start, self._end
@@ -184,6 +193,8 @@ class Engine:
                 if state == end and kind == END:
                     return values[-1]
             states.append(action)
+            if len(states) > max_stack:
+                raise TooDeep
             values.append(token)
             state = action
             position = match.end()  # type: ignore[union-attr]

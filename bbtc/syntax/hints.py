@@ -75,13 +75,14 @@ _NOT_IN_CONDITION = {
     "decrease": "costs and rewards change in effects only",
     "assign": "numbers change in effects only",
 }
-_NOT_IN_EFFECT = {
+NOT_IN_EFFECT = {
     "or": "an effect cannot leave open what happens: say `(oneof …)` or `(probabilistic …)`",
     "imply": "a conditional effect is `(when condition effect)`",
     "exists": "an effect changes given objects: use `(forall …)` and `(when …)`",
     "known": "an action makes a fact true or false, or `(unknown p)`",
     "=": "numbers change by `increase` and `decrease`; objects stay what they are",
 }
+"""Why a word that heads a condition cannot head an effect."""
 
 
 class Form(NamedTuple):
@@ -251,7 +252,7 @@ def _near(place: Place, word: str) -> str | None:
 def _misplaced(place: Place, word: str) -> str | None:
     """Why a keyword that has its place elsewhere cannot stand here."""
     if "WHEN" in place.accepted:
-        return _NOT_IN_EFFECT.get(word)
+        return NOT_IN_EFFECT.get(word)
     if "SEQUENCE" in place.accepted and word in CONNECTIVES:
         return "a condition in a tree is `(condition …)`"
     return _NOT_IN_CONDITION.get(word) if "IMPLY" in place.accepted else None

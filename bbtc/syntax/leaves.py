@@ -17,10 +17,12 @@ from bbtc.source import SourceFile, Span
 from bbtc.syntax.ast import (
     Assign,
     Atom,
+    Equality,
     FluentRef,
     FluentValue,
     InitElement,
     Name,
+    Not,
     Number,
     Term,
     TypedGroup,
@@ -41,12 +43,15 @@ def _setter(node: type, slot: str) -> Any:
     return getattr(node, slot).__set__
 
 
-_name_text, _name_span = _setter(Name, "text"), _setter(Name, "span")
-_variable_text, _variable_span = _setter(Variable, "text"), _setter(Variable, "span")
+_name_text, _name_source, _name_start = (_setter(Name, s) for s in ("text", "_source", "_start"))
+_variable_text, _variable_source, _variable_start = (
+    _setter(Variable, s) for s in ("text", "_source", "_start")
+)
 _atom_predicate, _atom_args, _atom_span = (_setter(Atom, s) for s in ("predicate", "args", "span"))
 _assign_atom, _assign_value, _assign_span = (_setter(Assign, s) for s in ("atom", "value", "span"))
 
 _WORD = re.compile(r"\??[^\s()?]+")
+_LITERAL = re.compile(r"\(([^()]*)\)|\(\s*not\s*(\([^()]*\))\s*\)", re.IGNORECASE)
 _GROUP = re.compile(r"([^\s-].*?)\s+-\s*(\S+)", re.DOTALL)
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 # A fact whose words stand one space apart, any fact, or the value of a fluent.
@@ -96,17 +101,18 @@ def terms(text: str, offset: int, source: SourceFile) -> list[Term]:
             if not word:
                 at += 1
                 continue
-            end = at + len(word)
             if word[0] == "?":
                 node = _new(Variable)
                 _variable_text(node, word)
-                _variable_span(node, _tuple(Span, (source, at, end)))
+                _variable_source(node, source)
+                _variable_start(node, at)
             else:
                 node = _new(Name)
                 _name_text(node, word)
-                _name_span(node, _tuple(Span, (source, at, end)))
+                _name_source(node, source)
+                _name_start(node, at)
             found.append(node)
-            at = end + 1
+            at += len(word) + 1
         return found
     for match in _WORD.finditer(text):
         word = match.group()
@@ -170,12 +176,12 @@ def facts(run: Token) -> list[InitElement]:
             words: list[Any] = []
             at = base + start + 1
             for word in match[1].split(" "):
-                stop = at + len(word)
                 node = _new(Name)
                 _name_text(node, word)
-                _name_span(node, _tuple(Span, (source, at, stop)))
+                _name_source(node, source)
+                _name_start(node, at)
                 words.append(node)
-                at = stop + 1
+                at += len(word) + 1
             fact = _new(Atom)
             _atom_predicate(fact, words[0])
             _atom_args(fact, tuple(words[1:]))
@@ -195,14 +201,47 @@ def facts(run: Token) -> list[InitElement]:
     return found
 
 
-def groups(run: Token) -> Iterator[TypedGroup]:
-    """The groups of a run ``a b - t c - u``."""
-    source, base = SOURCE.get(), run.start
-    for match in _GROUP.finditer(run.text):
-        start = base + match.start()
-        names = tuple(terms(match[1], start, source))
-        kind = Name(match[2], _tuple(Span, (source, base + match.start(2), base + match.end(2))))
-        yield TypedGroup(names, (kind,), Span(source, start, base + match.end(2)))
+def equation(text: str, offset: int) -> Equality:
+    """The equation ``(= a ?x)`` at an offset."""
+    sign = text.index("=") + 1
+    left, right = terms(text[sign:-1], offset + sign, SOURCE.get())
+    return Equality(left, right, Span(SOURCE.get(), offset, offset + len(text)))
+
+
+def literals(token: Token) -> Iterator[Atom | Equality | Not]:
+    """The parts of a token ``(and (p a) (not (q b)) (= a ?x))``."""
+    source, base, text = SOURCE.get(), token.start, token.text
+    for match in _LITERAL.finditer(text, text.index("(", 1)):
+        start, end = match.span()
+        span = _tuple(Span, (source, base + start, base + end))
+        if match[2] is None:
+            inner = match[1]
+            yield equation(match.group(), base + start) if inner.lstrip()[0] == "=" else _flat(inner, span)
+            continue
+        inner, at = match[2], base + match.start(2)
+        if inner[1:].lstrip()[0] == "=":
+            yield Not(equation(inner, at), span)
+        else:
+            yield Not(_flat(inner[1:-1], Span(source, at, at + len(inner))), span)
+
+
+def groups(text: str, offset: int) -> list[TypedGroup]:
+    """The groups of a text ``a b - t c - u d``."""
+    source = SOURCE.get()
+    found: list[TypedGroup] = []
+    at = 0
+    for match in _GROUP.finditer(text):
+        start, at = match.span()
+        names = tuple(terms(match[1], offset + start, source))
+        stop = offset + at
+        kind = Name(match[2], _tuple(Span, (source, offset + match.start(2), stop)))
+        found.append(TypedGroup(names, (kind,), _tuple(Span, (source, offset + start, stop))))
+    rest = text[at:].strip()
+    if rest:
+        start = offset + text.index(rest, at)
+        names = tuple(terms(rest, start, source))
+        found.append(TypedGroup(names, (), Span(source, start, start + len(rest))))
+    return found
 
 
 def number(text: str, span: Span) -> Number:

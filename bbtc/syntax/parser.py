@@ -13,7 +13,7 @@ from bbtc.diagnostics import Report
 from bbtc.source import SourceFile, Span
 from bbtc.syntax import ast, scan
 from bbtc.syntax.build import Builder
-from bbtc.syntax.engine import Engine, Unexpected, make_tables
+from bbtc.syntax.engine import Engine, TooDeep, Unexpected, make_tables
 from bbtc.syntax.leaves import SOURCE, Misuse
 from bbtc.syntax.recover import recovered
 
@@ -51,7 +51,7 @@ def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast
     token = SOURCE.set(source)
     try:
         with _collector_paused():
-            definitions = _definitions(text, source, report)
+            definitions = _definitions(text, source, report, max_depth)
             comments = scan.comments(source)
     finally:
         SOURCE.reset(token)
@@ -70,10 +70,25 @@ def _collector_paused() -> Iterator[None]:
         yield
     finally:
         if enabled:
+            if not gc.get_freeze_count():
+                # Straight to the old generation with them, or the collector would go through all of
+                # them as soon as it is enabled.
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 
-def _definitions(text: str, source: SourceFile, report: Report) -> tuple[ast.Definition, ...]:
+def _definitions(text: str, source: SourceFile, report: Report, max_depth: int) -> tuple[ast.Definition, ...]:
+    try:
+        # Every form that is open has a state on the stack: in a shallow stack nothing is too deep.
+        return _engine().parse(text, max_depth)  # type: ignore[no-any-return]
+    except (TooDeep, Unexpected, Misuse):
+        deep = scan.too_deep(text, max_depth)
+    if deep is not None:
+        report.error(
+            "BBT0005", f"parentheses are nested more than {max_depth} deep", Span(source, deep, deep + 1)
+        )
+        return ()
     try:
         return _engine().parse(text)  # type: ignore[no-any-return]
     except (Unexpected, Misuse):
