@@ -1,6 +1,6 @@
 """Behavior tree for the problem one-order of the domain warehouse. Made by bbtc.
 
-In the model of that domain it succeeds with probability 660449097/800000000.
+In the model of that domain it succeeds with probability 25893/32000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -366,121 +366,6 @@ def create_root(robot: Robot) -> Behaviour:
                         ),
                         Condition("loaded(drill)", lambda: robot.loaded("drill")),
                     ),
-                    sequence(
-                        "sequence for loaded(drill)",
-                        fallback(
-                            "search(drill)",
-                            sequence(
-                                "search_shelf(drill,a1)",
-                                fallback(
-                                    "fallback",
-                                    Condition("at(a1)", lambda: robot.at("a1")),
-                                    Latch(
-                                        "drive(a1)",
-                                        lambda: robot.drive("a1"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.at("a1")),
-                                            any_of(
-                                                robot.at("a1"),
-                                                robot.at("packing"),
-                                                robot.at("a2"),
-                                            ),
-                                        ),
-                                    ),
-                                ),
-                                skipper(
-                                    "skipper",
-                                    Condition(
-                                        "stored(drill,a1)",
-                                        lambda: robot.stored("drill", "a1"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        Latch(
-                                            "scan(drill,a1)",
-                                            lambda: robot.scan("drill", "a1"),
-                                            robot.cancel,
-                                            guard=lambda: all_of(
-                                                robot.at("a1"),
-                                                robot.stored("drill", "a1") is None,
-                                            ),
-                                        ),
-                                        Condition(
-                                            "known stored(drill,a1)",
-                                            lambda: robot.stored("drill", "a1") is not None,
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "fetch(drill,a1)",
-                                    lambda: robot.fetch("drill", "a1"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.at("a1"),
-                                        robot.stored("drill", "a1"),
-                                        negated(robot.loaded("drill")),
-                                    ),
-                                ),
-                                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                            ),
-                            sequence(
-                                "search_shelf(drill,a2)",
-                                fallback(
-                                    "fallback",
-                                    Condition("at(a2)", lambda: robot.at("a2")),
-                                    Latch(
-                                        "drive(a2)",
-                                        lambda: robot.drive("a2"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.at("a2")),
-                                            any_of(
-                                                robot.at("a2"),
-                                                robot.at("a1"),
-                                                robot.at("packing"),
-                                            ),
-                                        ),
-                                    ),
-                                ),
-                                skipper(
-                                    "skipper",
-                                    Condition(
-                                        "stored(drill,a2)",
-                                        lambda: robot.stored("drill", "a2"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        Latch(
-                                            "scan(drill,a2)",
-                                            lambda: robot.scan("drill", "a2"),
-                                            robot.cancel,
-                                            guard=lambda: all_of(
-                                                robot.at("a2"),
-                                                robot.stored("drill", "a2") is None,
-                                            ),
-                                        ),
-                                        Condition(
-                                            "known stored(drill,a2)",
-                                            lambda: robot.stored("drill", "a2") is not None,
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "fetch(drill,a2)",
-                                    lambda: robot.fetch("drill", "a2"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.at("a2"),
-                                        robot.stored("drill", "a2"),
-                                        negated(robot.loaded("drill")),
-                                    ),
-                                ),
-                                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                            ),
-                        ),
-                        Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                    ),
                 ),
                 fallback(
                     "fallback",
@@ -495,6 +380,17 @@ def create_root(robot: Robot) -> Behaviour:
                         Condition("at(packing)", lambda: robot.at("packing")),
                     ),
                 ),
+                Latch(
+                    "hand_in(drill,packing)",
+                    lambda: robot.hand_in("drill", "packing"),
+                    robot.cancel,
+                ),
+                Condition("delivered(drill)", lambda: robot.delivered("drill")),
+            ),
+            sequence(
+                "sequence for delivered(drill)",
+                Condition("loaded(drill)", lambda: robot.loaded("drill")),
+                Condition("at(packing)", lambda: robot.at("packing")),
                 Latch(
                     "hand_in(drill,packing)",
                     lambda: robot.hand_in("drill", "packing"),
