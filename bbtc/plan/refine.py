@@ -116,17 +116,15 @@ class _Refiner:
 
         return undo
 
-    def judge(self, change: _Change, gain: Fraction) -> None:
+    def judge(self, change: _Change, before: Simulated, after: Simulated) -> None:
         """Bar a template that could run at once and brought next to nothing of what its guide
-        promised."""
+        promised: the runs that end with its condition as it was are as many as before."""
         done = change.refinement
-        promised = done.probability * done.chance
-        if (
-            change.insertion is not None
-            and change.insertion[2] in self.task.template_by_name
-            and not done.unmet
-            and gain < promised * KEPT_PROMISE
-        ):
+        if change.insertion is None or change.insertion[2] not in self.task.template_by_name or done.unmet:
+            return
+        subgoal, value, _ = change.insertion
+        resolved = before.failing(subgoal.condition, value) - after.failing(subgoal.condition, value)
+        if resolved < done.probability * done.chance * KEPT_PROMISE:
             self.finder.banned.add(change.insertion)
 
     def retreat(self, changes: list[_Change], base: Simulated) -> Refinement | None:
@@ -177,7 +175,7 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
             before, current = current, refiner.simulate()
             tell(replace(change.refinement, success=current.success, nodes=_size(current)))
             since_base.append(change)
-            refiner.judge(change, current.success - before.success)
+            refiner.judge(change, before, current)
             if current.success > best.success:
                 best = current
             if _progress(base, current, target):

@@ -42,6 +42,19 @@ class Simulated:
         """The frozen tree."""
         return self.frozen.root
 
+    def failing(self, condition: Condition, value: Truth) -> Fraction:
+        """Probability of ending without success and with the condition at the value."""
+        states = self.chain.states
+        return sum(
+            (
+                probability
+                for index, probability in self.mass.items()
+                if self.chain.status[index] is not Status.SUCCESS
+                and evaluate(condition, states[index].values) is value
+            ),
+            Fraction(0),
+        )
+
     def started(self, target: Target) -> frozenset[Attempt]:
         """Attempts of which an action was started in some of a target's states."""
         finished = _finished(target.states)
