@@ -1,6 +1,6 @@
 """Behavior tree for the problem gift-set of the domain kitting. Made by bbtc.
 
-In the model of that domain it succeeds with probability 50513869650721/58982400000000.
+In the model of that domain it succeeds with probability 635449916832017/737280000000000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -319,53 +319,77 @@ def create_root(robot: Robot) -> Behaviour:
                         ),
                         sequence(
                             "sequence for holding(wine)",
-                            fallback(
-                                "fallback",
-                                Condition(
-                                    "unknown holding(wine)",
-                                    lambda: robot.holding("wine") is None,
-                                ),
-                                sequence(
-                                    "sequence for unknown holding(wine)",
-                                    Condition("gripper_free()", robot.gripper_free),
+                            sequence(
+                                "secure(wine)",
+                                fallback(
+                                    "fallback",
                                     Condition("in_view(wine)", lambda: robot.in_view("wine")),
-                                    Condition(
-                                        "not holding(wine)",
-                                        lambda: negated(robot.holding("wine")),
-                                    ),
-                                    Condition(
-                                        "not lost(wine)",
-                                        lambda: negated(robot.lost("wine")),
-                                    ),
-                                    Latch("pick(wine)", lambda: robot.pick("wine"), robot.cancel),
-                                    Condition(
-                                        "unknown holding(wine)",
-                                        lambda: robot.holding("wine") is None,
+                                    Latch(
+                                        "look_for(wine)",
+                                        lambda: robot.look_for("wine"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("wine")),
+                                            negated(robot.lost("wine")),
+                                        ),
                                     ),
                                 ),
-                                sequence(
-                                    "sequence for unknown holding(wine)",
-                                    Condition("gripper_free()", robot.gripper_free),
-                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
-                                    Condition(
-                                        "not holding(wine)",
-                                        lambda: negated(robot.holding("wine")),
-                                    ),
-                                    Condition(
-                                        "not lost(wine)",
-                                        lambda: negated(robot.lost("wine")),
-                                    ),
-                                    Latch("pick(wine)", lambda: robot.pick("wine"), robot.cancel),
-                                    Condition(
-                                        "unknown holding(wine)",
-                                        lambda: robot.holding("wine") is None,
+                                Latch(
+                                    "pick(wine)",
+                                    lambda: robot.pick("wine"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("wine"),
+                                        negated(robot.holding("wine")),
+                                        negated(robot.lost("wine")),
                                     ),
                                 ),
+                                Latch(
+                                    "read_force_sensor(wine)",
+                                    lambda: robot.read_force_sensor("wine"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("wine") is None,
+                                ),
+                                Condition("holding(wine)", lambda: robot.holding("wine")),
                             ),
-                            Latch(
-                                "read_force_sensor(wine)",
-                                lambda: robot.read_force_sensor("wine"),
-                                robot.cancel,
+                            Condition("holding(wine)", lambda: robot.holding("wine")),
+                        ),
+                        sequence(
+                            "sequence for holding(wine)",
+                            sequence(
+                                "secure(wine)",
+                                fallback(
+                                    "fallback",
+                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
+                                    Latch(
+                                        "look_for(wine)",
+                                        lambda: robot.look_for("wine"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("wine")),
+                                            negated(robot.lost("wine")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(wine)",
+                                    lambda: robot.pick("wine"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("wine"),
+                                        negated(robot.holding("wine")),
+                                        negated(robot.lost("wine")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(wine)",
+                                    lambda: robot.read_force_sensor("wine"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("wine") is None,
+                                ),
+                                Condition("holding(wine)", lambda: robot.holding("wine")),
                             ),
                             Condition("holding(wine)", lambda: robot.holding("wine")),
                         ),
@@ -475,84 +499,93 @@ def create_root(robot: Robot) -> Behaviour:
                         ),
                         sequence(
                             "sequence for holding(chocolates)",
-                            fallback(
-                                "fallback",
+                            sequence(
+                                "secure(chocolates)",
+                                fallback(
+                                    "fallback",
+                                    Condition(
+                                        "in_view(chocolates)",
+                                        lambda: robot.in_view("chocolates"),
+                                    ),
+                                    Latch(
+                                        "look_for(chocolates)",
+                                        lambda: robot.look_for("chocolates"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("chocolates")),
+                                            negated(robot.lost("chocolates")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(chocolates)",
+                                    lambda: robot.pick("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("chocolates"),
+                                        negated(robot.holding("chocolates")),
+                                        negated(robot.lost("chocolates")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(chocolates)",
+                                    lambda: robot.read_force_sensor("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("chocolates") is None,
+                                ),
                                 Condition(
-                                    "unknown holding(chocolates)",
-                                    lambda: robot.holding("chocolates") is None,
-                                ),
-                                sequence(
-                                    "sequence for unknown holding(chocolates)",
-                                    Condition("gripper_free()", robot.gripper_free),
-                                    Condition(
-                                        "in_view(chocolates)",
-                                        lambda: robot.in_view("chocolates"),
-                                    ),
-                                    Condition(
-                                        "not holding(chocolates)",
-                                        lambda: negated(robot.holding("chocolates")),
-                                    ),
-                                    Condition(
-                                        "not lost(chocolates)",
-                                        lambda: negated(robot.lost("chocolates")),
-                                    ),
-                                    Latch(
-                                        "pick(chocolates)",
-                                        lambda: robot.pick("chocolates"),
-                                        robot.cancel,
-                                    ),
-                                    Condition(
-                                        "unknown holding(chocolates)",
-                                        lambda: robot.holding("chocolates") is None,
-                                    ),
-                                ),
-                                sequence(
-                                    "sequence for unknown holding(chocolates)",
-                                    Condition("gripper_free()", robot.gripper_free),
-                                    Condition(
-                                        "in_view(chocolates)",
-                                        lambda: robot.in_view("chocolates"),
-                                    ),
-                                    Condition(
-                                        "not holding(chocolates)",
-                                        lambda: negated(robot.holding("chocolates")),
-                                    ),
-                                    Condition(
-                                        "not lost(chocolates)",
-                                        lambda: negated(robot.lost("chocolates")),
-                                    ),
-                                    Latch(
-                                        "pick(chocolates)",
-                                        lambda: robot.pick("chocolates"),
-                                        robot.cancel,
-                                    ),
-                                    Condition(
-                                        "unknown holding(chocolates)",
-                                        lambda: robot.holding("chocolates") is None,
-                                    ),
+                                    "holding(chocolates)",
+                                    lambda: robot.holding("chocolates"),
                                 ),
                             ),
-                            Latch(
-                                "read_force_sensor(chocolates)",
-                                lambda: robot.read_force_sensor("chocolates"),
-                                robot.cancel,
+                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
+                        ),
+                        sequence(
+                            "sequence for holding(chocolates)",
+                            sequence(
+                                "secure(chocolates)",
+                                fallback(
+                                    "fallback",
+                                    Condition(
+                                        "in_view(chocolates)",
+                                        lambda: robot.in_view("chocolates"),
+                                    ),
+                                    Latch(
+                                        "look_for(chocolates)",
+                                        lambda: robot.look_for("chocolates"),
+                                        robot.cancel,
+                                        guard=lambda: all_of(
+                                            negated(robot.in_view("chocolates")),
+                                            negated(robot.lost("chocolates")),
+                                        ),
+                                    ),
+                                ),
+                                Latch(
+                                    "pick(chocolates)",
+                                    lambda: robot.pick("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        robot.gripper_free(),
+                                        robot.in_view("chocolates"),
+                                        negated(robot.holding("chocolates")),
+                                        negated(robot.lost("chocolates")),
+                                    ),
+                                ),
+                                Latch(
+                                    "read_force_sensor(chocolates)",
+                                    lambda: robot.read_force_sensor("chocolates"),
+                                    robot.cancel,
+                                    guard=lambda: robot.holding("chocolates") is None,
+                                ),
+                                Condition(
+                                    "holding(chocolates)",
+                                    lambda: robot.holding("chocolates"),
+                                ),
                             ),
                             Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
                         ),
                     ),
-                    Latch(
-                        "place(chocolates,crate1)",
-                        lambda: robot.place("chocolates", "crate1"),
-                        robot.cancel,
-                    ),
-                    Condition(
-                        "packed(chocolates,crate1)",
-                        lambda: robot.packed("chocolates", "crate1"),
-                    ),
-                ),
-                sequence(
-                    "sequence for packed(chocolates,crate1)",
-                    Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
                     Latch(
                         "place(chocolates,crate1)",
                         lambda: robot.place("chocolates", "crate1"),

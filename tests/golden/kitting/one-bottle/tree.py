@@ -1,6 +1,6 @@
 """Behavior tree for the problem one-bottle of the domain kitting. Made by bbtc.
 
-In the model of that domain it succeeds with probability 46475691/51200000.
+In the model of that domain it succeeds with probability 18613863/20480000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -317,73 +317,81 @@ def create_root(robot: Robot) -> Behaviour:
                     ),
                     sequence(
                         "sequence for holding(water)",
-                        fallback(
-                            "fallback",
-                            Condition(
-                                "unknown holding(water)",
-                                lambda: robot.holding("water") is None,
-                            ),
-                            sequence(
-                                "sequence for unknown holding(water)",
-                                Condition("gripper_free()", robot.gripper_free),
-                                fallback(
-                                    "fallback",
-                                    Condition("in_view(water)", lambda: robot.in_view("water")),
-                                    sequence(
-                                        "sequence for in_view(water)",
-                                        Condition(
-                                            "not lost(water)",
-                                            lambda: negated(robot.lost("water")),
-                                        ),
-                                        Latch(
-                                            "look_for(water)",
-                                            lambda: robot.look_for("water"),
-                                            robot.cancel,
-                                        ),
-                                        Condition("in_view(water)", lambda: robot.in_view("water")),
+                        sequence(
+                            "secure(water)",
+                            fallback(
+                                "fallback",
+                                Condition("in_view(water)", lambda: robot.in_view("water")),
+                                Latch(
+                                    "look_for(water)",
+                                    lambda: robot.look_for("water"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        negated(robot.in_view("water")),
+                                        negated(robot.lost("water")),
                                     ),
                                 ),
-                                Condition(
-                                    "not holding(water)",
-                                    lambda: negated(robot.holding("water")),
-                                ),
-                                Condition("not lost(water)", lambda: negated(robot.lost("water"))),
-                                Latch("pick(water)", lambda: robot.pick("water"), robot.cancel),
-                                Condition(
-                                    "unknown holding(water)",
-                                    lambda: robot.holding("water") is None,
+                            ),
+                            Latch(
+                                "pick(water)",
+                                lambda: robot.pick("water"),
+                                robot.cancel,
+                                guard=lambda: all_of(
+                                    robot.gripper_free(),
+                                    robot.in_view("water"),
+                                    negated(robot.holding("water")),
+                                    negated(robot.lost("water")),
                                 ),
                             ),
-                            sequence(
-                                "sequence for unknown holding(water)",
-                                Condition("gripper_free()", robot.gripper_free),
-                                Condition("in_view(water)", lambda: robot.in_view("water")),
-                                Condition(
-                                    "not holding(water)",
-                                    lambda: negated(robot.holding("water")),
-                                ),
-                                Condition("not lost(water)", lambda: negated(robot.lost("water"))),
-                                Latch("pick(water)", lambda: robot.pick("water"), robot.cancel),
-                                Condition(
-                                    "unknown holding(water)",
-                                    lambda: robot.holding("water") is None,
-                                ),
+                            Latch(
+                                "read_force_sensor(water)",
+                                lambda: robot.read_force_sensor("water"),
+                                robot.cancel,
+                                guard=lambda: robot.holding("water") is None,
                             ),
+                            Condition("holding(water)", lambda: robot.holding("water")),
                         ),
-                        Latch(
-                            "read_force_sensor(water)",
-                            lambda: robot.read_force_sensor("water"),
-                            robot.cancel,
+                        Condition("holding(water)", lambda: robot.holding("water")),
+                    ),
+                    sequence(
+                        "sequence for holding(water)",
+                        sequence(
+                            "secure(water)",
+                            fallback(
+                                "fallback",
+                                Condition("in_view(water)", lambda: robot.in_view("water")),
+                                Latch(
+                                    "look_for(water)",
+                                    lambda: robot.look_for("water"),
+                                    robot.cancel,
+                                    guard=lambda: all_of(
+                                        negated(robot.in_view("water")),
+                                        negated(robot.lost("water")),
+                                    ),
+                                ),
+                            ),
+                            Latch(
+                                "pick(water)",
+                                lambda: robot.pick("water"),
+                                robot.cancel,
+                                guard=lambda: all_of(
+                                    robot.gripper_free(),
+                                    robot.in_view("water"),
+                                    negated(robot.holding("water")),
+                                    negated(robot.lost("water")),
+                                ),
+                            ),
+                            Latch(
+                                "read_force_sensor(water)",
+                                lambda: robot.read_force_sensor("water"),
+                                robot.cancel,
+                                guard=lambda: robot.holding("water") is None,
+                            ),
+                            Condition("holding(water)", lambda: robot.holding("water")),
                         ),
                         Condition("holding(water)", lambda: robot.holding("water")),
                     ),
                 ),
-                Latch("place(water,tray1)", lambda: robot.place("water", "tray1"), robot.cancel),
-                Condition("packed(water,tray1)", lambda: robot.packed("water", "tray1")),
-            ),
-            sequence(
-                "sequence for packed(water,tray1)",
-                Condition("holding(water)", lambda: robot.holding("water")),
                 Latch("place(water,tray1)", lambda: robot.place("water", "tray1"), robot.cancel),
                 Condition("packed(water,tray1)", lambda: robot.packed("water", "tray1")),
             ),
