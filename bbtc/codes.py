@@ -61,6 +61,7 @@ CODES: dict[str, str] = {
     "BBT0308": "doubtful probability",
     "BBT0309": "unused parameter",
     "BBT0310": "unused template",
+    "BBT0311": "requirements that do not match the content",
     # 04xx: grounding
     "BBT0403": "too many initial states",
     "BBT0404": "oneof in the initial state",
@@ -90,6 +91,7 @@ CODES: dict[str, str] = {
     "BBT0610": "action in a child of a Skipper that is not the last",
     "BBT0611": "control node without children",
     "BBT0612": "template calls itself",
+    "BBT0613": "wrong number of attempts",
     # 07xx: exports
     "BBT0701": "unknown export format",
     "BBT0702": "two exporters claim one format",

@@ -9,7 +9,7 @@ from fractions import Fraction
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import Figures, figures, flow
 from bbtc.belief.soundness import violations
-from bbtc.diagnostics import BbtcError, Related, Report
+from bbtc.diagnostics import BbtcError, Related, Report, Severity
 from bbtc.export.registry import load_exporter, parse_options
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -64,7 +64,8 @@ def select(documents: Sequence[Document], report: Report) -> Inputs | None:
 
 
 def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
-    """Names resolved and, with ``checks``, the doubtful reported. Raises :class:`BbtcError`."""
+    """Names resolved and, with ``checks``, the doubtful reported (what is only noted is left to
+    ``bbtc check``). Raises :class:`BbtcError`."""
     from bbtc.analysis.check import check
     from bbtc.analysis.resolve import resolve
 
@@ -73,7 +74,8 @@ def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
     assert model is not None
     if checks:
         for diagnostic in check(model):
-            report.add(diagnostic)
+            if diagnostic.severity is not Severity.NOTE:
+                report.add(diagnostic)
         report.raise_errors()
     return model
 

@@ -1,4 +1,9 @@
-"""Checks of a model: each a pure function with a code of its own, all of them warnings."""
+"""Checks of a model: each a pure function with a code of its own, warnings or notes.
+
+What holds for one problem need not hold for the domain: an action that this problem never needs may
+be what another one is about. So a finding about the domain that rests on the problem is a note, and a
+warning only where it holds for every one of several problems.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +15,7 @@ from typing_extensions import assert_never
 
 from bbtc.analysis import facts
 from bbtc.analysis.bodies import calls
+from bbtc.analysis.requirements import missing, unneeded
 from bbtc.diagnostics import Diagnostic, Related, Severity
 from bbtc.kleene import Truth
 from bbtc.model import domain as md
@@ -24,18 +30,44 @@ _SHORTFALL = Fraction(1, 100)
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A check and the code of its findings. ``needs_problem``: it says nothing of a domain alone."""
+    """A check and the code of its findings. ``needs_problem``: they rest on what a problem says."""
 
     code: str
     find: Callable[[md.Model], Iterator[Diagnostic]]
     needs_problem: bool = False
 
 
-def check(model: md.Model) -> Iterator[Diagnostic]:
-    """The findings of every check that applies."""
+def check(*models: md.Model) -> Iterator[Diagnostic]:
+    """The findings about a domain: the models are those of one domain with each of its problems, or
+    that of the domain alone."""
     for each in CHECKS:
-        if model.problem is not None or not each.needs_problem:
-            yield from each.find(model)
+        if models[0].problem is not None or not each.needs_problem:
+            yield from _merged(each, models)
+
+
+def _merged(each: Check, models: tuple[md.Model, ...]) -> Iterator[Diagnostic]:
+    """What a check finds in a problem, and what it finds in the domain with every problem."""
+    rounds = [(model, list(each.find(model))) for model in models]
+    keys = [{(found.message, found.span) for found in findings} for _, findings in rounds]
+    common = set.intersection(*keys)
+    for number, (model, findings) in enumerate(rounds):
+        for found in findings:
+            if _in_problem(model, found.span):
+                yield found
+            elif number == 0 and (found.message, found.span) in common:
+                note = each.needs_problem and len(models) == 1
+                yield replace(found, severity=Severity.NOTE) if note else found
+
+
+def _in_problem(model: md.Model, span: Span | None) -> bool:
+    """Whether a place is in the problem of a model, not in its domain."""
+    domain, problem = model.span, model.problem_span
+    if span is None or domain is None or problem is None or span.source is not problem.source:
+        return False
+    if domain.source is not problem.source:
+        return True
+    # One file holds both: the later definition begins between their names.
+    return span.start > problem.start if problem.start > domain.start else span.start < domain.start
 
 
 def _warning(
@@ -47,55 +79,105 @@ def _warning(
 # --- predicates and conditions ---------------------------------------------------------------
 
 
-def _unused_predicates(model: md.Model) -> Iterator[Diagnostic]:
+def _unread(model: md.Model) -> Iterator[tuple[md.Predicate, bool]]:
+    """Predicates that nothing reads, each with whether anything sets it."""
     read = {atom.predicate for formula in facts.all_conditions(model) for atom in mf.atoms(formula)}
     for schema in model.schemas.values():
         read |= facts.observed(schema)
     written = {leaf.predicate for schema in model.schemas.values() for leaf in facts.settings(schema.effect)}
     written |= {rule.predicate for rule in model.rules}
     for name, predicate in model.predicates.items():
-        if name in read:
-            continue
-        if name not in written:
-            yield _warning("BBT0301", f"predicate `{name}` is never used", predicate.span)
-        elif model.problem is not None:
+        if name not in read:
+            yield predicate, name in written
+
+
+def _unused_predicates(model: md.Model) -> Iterator[Diagnostic]:
+    for predicate, written in _unread(model):
+        if not written:
+            yield _warning("BBT0301", f"predicate `{predicate.name}` is never used", predicate.span)
+
+
+def _unread_predicates(model: md.Model) -> Iterator[Diagnostic]:
+    for predicate, written in _unread(model):
+        if written:
             yield _warning(
                 "BBT0301",
-                f"nothing reads predicate `{name}`",
+                f"nothing reads predicate `{predicate.name}`",
                 predicate.span,
                 "no precondition, `when`, template or goal depends on it",
             )
 
 
-def _hopeless_conditions(model: md.Model) -> Iterator[Diagnostic]:
+def _never_unknown(model: md.Model) -> Iterator[Diagnostic]:
     reached = facts.reached(model)
-    known = {
+    for name, predicate in model.predicates.items():
+        if predicate.declared_three_valued and (name, Truth.UNKNOWN) not in reached.values:
+            yield _warning(
+                "BBT0218",
+                f"`{name}` is declared three-valued, but nothing makes it unknown",
+                predicate.span,
+                f"no `(unknown ({name} …))` stands in `:init` or in an effect that can happen",
+            )
+
+
+def _set_to(model: md.Model, *, unknown: bool) -> set[str]:
+    """Predicates that an action makes unknown; or those that one makes true or false."""
+    return {
         leaf.predicate
         for schema in model.schemas.values()
         for leaf in facts.settings(schema.effect)
-        if leaf.value is not Truth.UNKNOWN
+        if (leaf.value is Truth.UNKNOWN) is unknown
+    }
+
+
+def _never_known(model: md.Model, lost: set[str]) -> Iterator[Diagnostic]:
+    """Readings of the values of ``lost`` predicates, those that are unknown at some time, that
+    nothing ever tells."""
+    told = _set_to(model, unknown=False) | {
+        atom.predicate for sensor in model.sensors for atom in mf.atoms(sensor.sensed)
     }
     for schema in model.schemas.values():
-        known |= facts.observed(schema)
-    known |= {atom.predicate for sensor in model.sensors for atom in mf.atoms(sensor.sensed)}
-    told: set[tuple[str, Truth | None]] = set()
+        told |= facts.observed(schema)
     for formula in facts.all_conditions(model):
         for reading in facts.readings(formula):
-            name = reading.atom.predicate
-            predicate = model.predicates[name]
-            related = (Related(f"`{name}` is declared here", predicate.span),)
-            if (name, Truth.UNKNOWN) in reached.values and name not in known and not predicate.derived:
-                if reading.value is not Truth.UNKNOWN and (name, None) not in told:
-                    told.add((name, None))
-                    message = f"no action makes `{name}` known"
-                    yield _warning("BBT0304", message, reading.span, None, related)
-            elif (
-                reading.value is not None
-                and (name, reading.value) not in reached.values
-                and (name, reading.value) not in told
+            predicate = model.predicates[reading.atom.predicate]
+            if reading.value is Truth.UNKNOWN or predicate.name not in lost or predicate.name in told:
+                continue
+            if not predicate.derived:
+                told.add(predicate.name)
+                yield _warning(
+                    "BBT0304",
+                    f"no action makes `{predicate.name}` known",
+                    reading.span,
+                    "it is unknown at some time, and no effect makes it true or false again",
+                    (Related(f"`{predicate.name}` is declared here", predicate.span),),
+                )
+
+
+def _lost_knowledge(model: md.Model) -> Iterator[Diagnostic]:
+    yield from _never_known(model, _set_to(model, unknown=True))
+
+
+def _hopeless_conditions(model: md.Model) -> Iterator[Diagnostic]:
+    reached = facts.reached(model)
+    lost = _set_to(model, unknown=True)
+    initially = {name for name, value in reached.values if value is Truth.UNKNOWN} - lost
+    unknown = [*_never_known(model, initially)]
+    yield from unknown
+    never_known = {found.related[0].message for found in [*unknown, *_lost_knowledge(model)]}
+    told: set[tuple[str, Truth]] = set()
+    for formula in facts.all_conditions(model):
+        for reading in facts.readings(formula):
+            name, value = reading.atom.predicate, reading.value
+            related = (Related(f"`{name}` is declared here", model.predicates[name].span),)
+            if (
+                value is not None
+                and (name, value) not in reached.values
+                and (name, value) not in told
+                and (value is Truth.UNKNOWN or related[0].message not in never_known)
             ):
-                told.add((name, reading.value))
-                message = f"nothing makes `{name}` {reading.value.word}"
+                told.add((name, value))
+                message = f"nothing makes `{name}` {value.word}"
                 hint = "`:init` does not give it, and no action that can apply sets it"
                 yield _warning("BBT0304", message, reading.span, hint, related)
 
@@ -221,8 +303,18 @@ def _probabilities_in(effect: me.Effect) -> Iterator[Diagnostic]:
         case me.When(_, inner) | me.ForEach(_, inner):
             yield from _probabilities_in(inner)
         case me.Choice(branches, _, span):
+            seen: dict[me.Effect, me.Branch] = {}
             for branch in branches:
                 rest = branch.span == span and branch.effect == me.NOTHING
+                before = branch if rest else seen.setdefault(branch.effect, branch)
+                if before is not branch and before.probability != 0:
+                    yield _warning(
+                        "BBT0308",
+                        "two outcomes of one choice are the same",
+                        branch.span,
+                        "write it once, with the sum of the probabilities",
+                        (Related("the other one", before.span),),
+                    )
                 if branch.probability == 0:
                     yield _warning("BBT0308", "this outcome has probability 0", branch.span)
                 elif rest and branch.probability <= _SHORTFALL:
@@ -281,9 +373,12 @@ def _unused_templates(model: md.Model) -> Iterator[Diagnostic]:
 
 
 CHECKS = (
+    Check("BBT0218", _never_unknown, needs_problem=True),
     Check("BBT0301", _unused_predicates),
+    Check("BBT0301", _unread_predicates, needs_problem=True),
     Check("BBT0302", _unreachable_actions, needs_problem=True),
     Check("BBT0303", _contradictions),
+    Check("BBT0304", _lost_knowledge),
     Check("BBT0304", _hopeless_conditions, needs_problem=True),
     Check("BBT0305", _duplicates),
     Check("BBT0306", _without_effect),
@@ -291,4 +386,6 @@ CHECKS = (
     Check("BBT0308", _probabilities),
     Check("BBT0309", _unused_parameters),
     Check("BBT0310", _unused_templates),
+    Check("BBT0311", missing),
+    Check("BBT0311", unneeded, needs_problem=True),
 )

@@ -47,7 +47,9 @@ def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Repo
         names.section = f"template {node.name.key}"
         templates.setdefault(node.name.key, bodies.template(names, node))
     bodies.check_templates(report, templates)
-    requirements = tuple(key.key for section in sections(domain, ast.Requirements) for key in section.keys)
+    requirements = {
+        key.key: key.span for section in sections(domain, ast.Requirements) for key in section.keys
+    }
     model = md.Model(
         domain=domain.name.key,
         problem=None,
@@ -67,7 +69,7 @@ def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Repo
     )
     if problem is not None:
         model = _with_problem(names, model, domain, problem)
-    model = replace(model, predicates=_three_valued(names, model, problem is not None))
+    model = replace(model, predicates=_three_valued(model))
     return None if report.errors else model
 
 
@@ -222,7 +224,7 @@ def _counts_cost(names: Names, schemas: dict[str, md.Schema]) -> bool:
     return any(isinstance(leaf, me.Add) and leaf.to == "cost" for leaf in added)
 
 
-def _three_valued(names: Names, model: md.Model, complete: bool) -> dict[str, md.Predicate]:
+def _three_valued(model: md.Model) -> dict[str, md.Predicate]:
     """Mark the predicates that something makes unknown, derived ones through what they read."""
     unknown: dict[str, None] = {}
     effects = [schema.effect for schema in model.schemas.values()] + list(model.init.choices)
@@ -240,15 +242,6 @@ def _three_valued(names: Names, model: md.Model, complete: bool) -> dict[str, md
             ):
                 unknown[rule.predicate] = None
                 grown = True
-    if complete:
-        for key, predicate in model.predicates.items():
-            if predicate.declared_three_valued and key not in unknown:
-                names.report.warning(
-                    "BBT0218",
-                    f"`{key}` is declared three-valued, but nothing makes it unknown",
-                    predicate.span,
-                    f"no `(unknown ({key} …))` stands in an effect or in `:init`",
-                )
     return {
         key: replace(predicate, three_valued=key in unknown or predicate.declared_three_valued)
         for key, predicate in model.predicates.items()

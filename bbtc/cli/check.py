@@ -2,53 +2,126 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import click
 
 from bbtc.cli.session import Session
 from bbtc.cli.session import command as session_command
-from bbtc.syntax.ast import Definition
+from bbtc.codes import CODES
+from bbtc.diagnostics import Diagnostic, Report, Severity
+from bbtc.syntax.ast import Definition, Document
+
+
+class CodePrefixes(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """Codes or beginnings of codes, comma-separated: ``BBT0301``, ``BBT03``."""
+
+    name = "codes"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """The prefixes in capitals; one that no code begins with is wrong usage."""
+        prefixes = tuple(part.strip().upper() for part in str(value).split(",") if part.strip())
+        for prefix in prefixes:
+            if not any(code.startswith(prefix) for code in CODES):
+                self.fail(f"no code begins with '{prefix[:40]}'", param, ctx)
+        return prefixes
 
 
 @click.command("check")
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option(
+    "--select",
+    type=CodePrefixes(),
+    multiple=True,
+    metavar="CODES",
+    help="Show only the warnings and notes with these codes, or whose codes begin so.",
+)
+@click.option(
+    "--ignore",
+    type=CodePrefixes(),
+    multiple=True,
+    metavar="CODES",
+    help="Do not show the warnings and notes with these codes. The longer of two prefixes decides.",
+)
+@click.option("--strict", is_flag=True, help="Fail if there are warnings.")
 @session_command
-def command(session: Session, files: tuple[str, ...]) -> None:
+def command(
+    session: Session,
+    files: tuple[str, ...],
+    select: tuple[tuple[str, ...], ...],
+    ignore: tuple[tuple[str, ...], ...],
+    strict: bool,
+) -> int:
     """Report what is wrong or doubtful in FILES: syntax, names, types, probabilities, conditions
     that nothing makes true or known.
 
     Every problem is checked with the domain of its name among FILES; a problem without its domain
-    is checked for syntax only.
+    is checked for syntax only. What rests on the problem, such as an action that it never needs, is
+    a note; with several problems it is reported only if it holds for all of them, as a warning.
+    Errors are always shown. `bbtc explain CODE` tells more about a code.
     """
-    from bbtc.analysis.check import check
-    from bbtc.analysis.resolve import resolve
     from bbtc.cli.wording import counted
-    from bbtc.diagnostics import Report
     from bbtc.pipeline import parse_all
 
-    sources = [session.read(file) for file in files]
-    documents = parse_all(sources, session.report)
-    session.report.raise_errors()
-    domains: dict[str, Definition] = {}
-    problems: list[Definition] = []
-    for document in documents:
-        for definition in document.definitions:
-            if definition.kind == "domain":
-                domains.setdefault(definition.name.key, definition)
-            else:
-                problems.append(definition)
-    pairs = [(_domain_of(problem, domains), problem) for problem in problems]
-    used = {domain.name.key for domain, _ in pairs if domain is not None}
-    tasks: list[tuple[Definition, Definition | None]] = [(d, p) for d, p in pairs if d is not None]
-    tasks.extend((domain, None) for key, domain in domains.items() if key not in used)
-    for domain, problem in tasks:
-        # A report of its own: the errors of one pair do not hide the checks of the next.
-        report = Report()
-        model = resolve(domain, problem, report)
-        for diagnostic in [*report, *(check(model) if model is not None else ())]:
+    report = Report()
+    try:
+        documents = parse_all([session.read(file) for file in files], report)
+        if not report.errors:
+            _check(documents, report)
+    finally:
+        for diagnostic in chosen(report, sum(select, ()), sum(ignore, ())):
             session.report.add(diagnostic)
     session.report.raise_errors()
-    warnings = counted(len(list(session.report)), "warning")
-    session.say(f"{counted(len(files), 'file')} checked, {warnings}")
+    found = [diagnostic.severity for diagnostic in session.report]
+    warnings, notes = found.count(Severity.WARNING), found.count(Severity.NOTE)
+    summary = f"{counted(len(files), 'file')} checked, {counted(warnings, 'warning')}"
+    session.say(summary + (f", {counted(notes, 'note')}" if notes else ""))
+    return 1 if strict and warnings else 0
+
+
+def chosen(
+    diagnostics: Iterable[Diagnostic], select: tuple[str, ...], ignore: tuple[str, ...]
+) -> list[Diagnostic]:
+    """All errors, and the warnings and notes that are selected (without ``select``: all) and not
+    ignored. Where prefixes of both kinds fit a code, the longer one decides."""
+
+    def fit(code: str, prefixes: tuple[str, ...]) -> int:
+        return max((len(prefix) for prefix in prefixes if code.startswith(prefix)), default=-1)
+
+    def shown(diagnostic: Diagnostic) -> bool:
+        selected = fit(diagnostic.code, select or ("",))
+        return diagnostic.severity is Severity.ERROR or selected > fit(diagnostic.code, ignore)
+
+    return [diagnostic for diagnostic in diagnostics if shown(diagnostic)]
+
+
+def _check(documents: Iterable[Document], report: Report) -> None:
+    from bbtc.analysis.check import check
+    from bbtc.analysis.resolve import resolve
+
+    definitions = [definition for document in documents for definition in document.definitions]
+    domains: dict[str, Definition] = {}
+    for definition in definitions:
+        if definition.kind == "domain":
+            domains.setdefault(definition.name.key, definition)
+    problems: dict[str, list[Definition | None]] = {key: [] for key in domains}
+    for definition in definitions:
+        domain = _domain_of(definition, domains) if definition.kind == "problem" else None
+        if domain is not None:
+            problems[domain.name.key].append(definition)
+    for key, domain in domains.items():
+        models = []
+        for problem in problems[key] or [None]:
+            # A report of its own: the errors of one problem do not hide the checks of the next.
+            own = Report()
+            model = resolve(domain, problem, own)
+            models.extend([] if model is None else [model])
+            for diagnostic in own:
+                report.add(diagnostic)
+        for diagnostic in check(*models) if models else ():
+            report.add(diagnostic)
 
 
 def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:

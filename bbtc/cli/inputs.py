@@ -29,7 +29,7 @@ def task_of(session: Session, sources: list[SourceFile], limits: Limits) -> Task
         if len(sources) > 1:
             raise BbtcError.single("BBT0006", "a compiled task stands alone", hint="leave the other file out")
         return task_from_text(sources[0])
-    return compile_sources(sources, session.report, limits)
+    return compile_sources(sources, session.report, limits, checks=True)
 
 
 def tree_of(source: SourceFile) -> Tree:

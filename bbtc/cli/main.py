@@ -12,11 +12,13 @@ from importlib import import_module
 import click
 
 COMMANDS = {
+    "fmt": "Give domains and problems their canonical layout.",
     "check": "Report what is wrong or doubtful in domains and problems.",
     "compile": "Parse, check and ground a problem into a task.",
     "plan": "Plan a tree that reaches the goal with the wanted probability.",
     "simulate": "Print the exact figures of a tree.",
     "export": "Write a tree for people or for an execution engine.",
+    "explain": "Explain what a code of a message means.",
 }
 
 EXIT_ERRORS = 1

@@ -13,8 +13,8 @@ from pathlib import Path
 from bbtc.diagnostics import BbtcError
 
 
-def write(path: str, content: str | bytes, *, check: bool = False) -> None:
-    """Write an artefact to ``path`` (``-``: stdout).
+def write(path: str, content: str | bytes, *, check: bool = False) -> bool:
+    """Write an artefact to ``path`` (``-``: stdout); whether anything was written.
 
     A file is written beside its place and renamed, and left untouched if it has the content
     already. With ``check`` nothing is written, and a difference raises :class:`BbtcError` with a
@@ -26,7 +26,7 @@ def write(path: str, content: str | bytes, *, check: bool = False) -> None:
             sys.stdout.flush()
             sys.stdout.buffer.write(data)
             sys.stdout.buffer.flush()
-        return
+        return not check
     try:
         old = Path(path).read_bytes()
     except FileNotFoundError:
@@ -34,12 +34,16 @@ def write(path: str, content: str | bytes, *, check: bool = False) -> None:
     except OSError as error:
         raise BbtcError.single("BBT0004", f"cannot read {path}: {error.strerror}") from error
     if old == data:
-        return
+        return False
     if check:
-        raise BbtcError.single(
-            "BBT0008", _drift(path, old, data), hint="run the same command without --check"
-        )
+        raise drift(path, old, data)
     _replace(path, data)
+    return True
+
+
+def drift(path: str, old: bytes | None, new: bytes) -> BbtcError:
+    """The error that shows how a file (None: there is none) differs from what would be written."""
+    return BbtcError.single("BBT0008", _diff(path, old, new), hint="run the same command without --check")
 
 
 def _replace(path: str, data: bytes) -> None:
@@ -66,7 +70,7 @@ def _umask() -> int:
     return mask
 
 
-def _drift(path: str, old: bytes | None, new: bytes) -> str:
+def _diff(path: str, old: bytes | None, new: bytes) -> str:
     if old is None:
         return f"{path} does not exist"
     try:

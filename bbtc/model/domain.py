@@ -186,7 +186,7 @@ class Model:
     goal_reward: Fraction = Fraction(0)
     metric: Literal["cost", "reward"] = "cost"
     counts_cost: bool = False
-    requirements: tuple[str, ...] = ()
+    requirements: Mapping[str, Span] = field(default_factory=dict)
     goal_span: Span | None = field(default=None, compare=False, repr=False)
     span: Span | None = field(default=None, compare=False, repr=False)
     problem_span: Span | None = field(default=None, compare=False, repr=False)

@@ -1,8 +1,8 @@
 ; A porter robot in an office building at night. A door may be locked, which the robot does not know
 ; until it tries the handle; then it needs the key from the board, or somebody who opens.
 (define (domain doors)
-  (:requirements :typing :negative-preconditions :equality :existential-preconditions
-                 :probabilistic-effects :unknown)
+  (:requirements :typing :negative-preconditions :equality :disjunctive-preconditions
+                 :existential-preconditions :probabilistic-effects :unknown)
   (:types room door key)
 
   (:predicates

@@ -1,8 +1,9 @@
 ; A tracked robot inspects the valves and gauges of a pump house. Its camera needs light: the lamps of
 ; the area, which may be broken, or its own torch, which costs battery.
 (define (domain inspection)
-  (:requirements :typing :negative-preconditions :disjunctive-preconditions :universal-preconditions
-                 :conditional-effects :universal-effects :probabilistic-effects :action-costs :unknown)
+  (:requirements :typing :negative-preconditions :disjunctive-preconditions :existential-preconditions
+                 :universal-preconditions :conditional-effects :universal-effects
+                 :probabilistic-effects :action-costs :unknown)
   (:types valve gauge - asset
           area asset - object)
   (:constants pump_hall - area)

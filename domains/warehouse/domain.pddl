@@ -1,8 +1,9 @@
 ; A picking robot fetches items from shelves and brings them to the packing station. Aisles may be
 ; blocked by pallets, and what stands on a shelf is known only after a scan of its barcode.
 (define (domain warehouse)
-  (:requirements :typing :negative-preconditions :equality :derived-predicates :action-costs
-                 :existential-preconditions :probabilistic-effects :non-deterministic :unknown :templates)
+  (:requirements :typing :negative-preconditions :equality :disjunctive-preconditions
+                 :existential-preconditions :derived-predicates :conditional-effects :universal-effects
+                 :action-costs :probabilistic-effects :non-deterministic :unknown :templates)
   (:types shelf station - spot
           spot item - object)
 

@@ -1,0 +1,45 @@
+"""``bbtc explain``: what a code means, why it is reported, and how to mend it."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from importlib.resources import files
+from pathlib import Path
+
+import click
+
+from bbtc.codes import CODES
+
+
+def page(code: str) -> str:
+    """The page of a registered code: package data in a wheel, ``docs/errors/`` in a checkout."""
+    packaged = files("bbtc") / "errors" / f"{code}.md"
+    if packaged.is_file():
+        return packaged.read_text("utf-8")
+    return (Path(__file__).parents[2] / "docs" / "errors" / f"{code}.md").read_text("utf-8")
+
+
+def _code(text: str) -> str:
+    """The code that a text stands for: ``bbt0202``, ``0202`` and ``202`` are BBT0202.
+
+    Raises :class:`click.UsageError` for an unknown one, with the nearest.
+    """
+    digits = re.fullmatch(r"(?:BBT)?(\d{1,4})", text.strip().strip("[]").upper())
+    code = f"BBT{digits[1]:>04}" if digits else text.upper()
+    if code in CODES:
+        return code
+    near = difflib.get_close_matches(code[:20], CODES, 3, 0.7)
+    hint = f" Near ones: {', '.join(near)}." if near else ""
+    raise click.UsageError(f"There is no code '{text[:40]}'.{hint} `bbtc explain` lists all.")
+
+
+@click.command("explain")
+@click.argument("code", required=False)
+def command(code: str | None) -> None:
+    """Explain what CODE (such as BBT0202) means, why it is reported, and how to mend it. Without
+    CODE, list all codes."""
+    if code is None:
+        click.echo("".join(f"{each}  {title}\n" for each, title in CODES.items()), nl=False)
+    else:
+        click.echo(page(_code(code)), nl=False)

@@ -1,0 +1,59 @@
+"""``bbtc fmt``: the canonical layout of files, in place."""
+
+from __future__ import annotations
+
+import click
+
+from bbtc.cli.session import Session
+from bbtc.cli.session import command as session_command
+from bbtc.diagnostics import BbtcError
+from bbtc.source import SourceFile
+
+
+@click.command("fmt")
+@click.argument("files", nargs=-1, required=True, metavar="FILES...")
+@click.option("--check", is_flag=True, help="Write nothing; show a diff and fail if a layout would change.")
+@session_command
+def command(session: Session, files: tuple[str, ...], check: bool) -> None:
+    """Give FILES their canonical layout, in place; `-` reads the standard input and writes to the
+    standard output.
+
+    Comments are kept. A file with syntax errors is left as it is, and so is one that has the layout
+    already.
+    """
+    from bbtc.cli.output import drift, write
+    from bbtc.cli.wording import counted
+
+    files = tuple(dict.fromkeys(files))
+    changed = 0
+    for file in files:
+        try:
+            source = session.read(file)
+            text = _formatted(source)
+            if file == "-" and check and text != source.text:
+                raise drift(source.name, source.text.encode(), text.encode())
+            changed += write(file, text, check=check)
+        except BbtcError as error:
+            # The other files get their layout all the same.
+            for diagnostic in error.diagnostics:
+                session.report.add(diagnostic)
+    session.report.raise_errors()
+    if files != ("-",):
+        session.say(f"{counted(len(files), 'file')}, {changed} changed")
+
+
+def _formatted(source: SourceFile) -> str:
+    """The text in canonical layout. Raises :class:`BbtcError` for syntax errors."""
+    from bbtc.diagnostics import Report
+    from bbtc.syntax.parser import parse
+    from bbtc.syntax.printer import print_document
+
+    report = Report()
+    document = parse(source, report)
+    report.raise_errors()
+    text = print_document(document)
+    # The layout must never change what a file says: a bug here must not cost anybody a domain.
+    again = parse(SourceFile(source.name, text), report)
+    if again.definitions != document.definitions or len(again.comments) != len(document.comments):
+        raise AssertionError(f"the layout of {source.name} would change its meaning")
+    return text

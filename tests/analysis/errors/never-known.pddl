@@ -1,0 +1,5 @@
+(define (domain d)
+  (:predicates (lost) (hidden) (free) (done))
+  (:action lose :effect (and (free) (unknown (lost))))
+  (:action use :precondition (and (free) (lost) (hidden)) :effect (done)))
+(define (problem x) (:domain d) (:init (unknown (hidden))) (:goal (done)))
