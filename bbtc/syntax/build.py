@@ -148,8 +148,6 @@ class Builder:
                 types, span = child
                 groups.append(ast.TypedGroup(names, types, Span(span.source, names[0].span.start, span.end)))
                 names = ()
-            elif child.kind.startswith("TYPED"):
-                groups.extend(leaves.groups(child.text, child.start))
             else:
                 names += tuple(leaves.terms(child.text, child.start, SOURCE.get()))
         if names:
@@ -158,12 +156,15 @@ class Builder:
 
     typed_variables = typed_names
 
+    def names_flat(self, children: list[Any]) -> ast.TypedList:
+        return leaves.groups(children[0].text, children[0].start, variables=False)
+
     def variable_list(self, children: list[Any]) -> ast.TypedList:
         return children[1]  # type: ignore[no-any-return]
 
     def variables_flat(self, children: list[Any]) -> ast.TypedList:
         token = children[0]
-        return tuple(leaves.groups(token.text[1:-1], token.start + 1))
+        return leaves.groups(token.text[1:-1], token.start + 1, variables=True)
 
     def type(self, children: list[Any]) -> tuple[tuple[ast.Name, ...], Span]:
         return (leaves.name(children[1]),), between(children[0], children[1])
@@ -189,8 +190,8 @@ class Builder:
         assert found is not None
         start = token.start + found.start()
         name = ast.Name(found.group(), Span(SOURCE.get(), start, start + len(found.group())))
-        entries = leaves.groups(token.text[found.end() : -1], token.start + found.end())
-        return ast.PredicateDeclaration(name, tuple(entries), False, of(token))
+        entries = leaves.groups(token.text[found.end() : -1], token.start + found.end(), variables=True)
+        return ast.PredicateDeclaration(name, entries, False, of(token))
 
     def predicate_unknown(self, children: list[Any]) -> ast.PredicateDeclaration:
         unknown, head, parameters, _, close = children

@@ -50,9 +50,10 @@ _variable_text, _variable_source, _variable_start = (
 _atom_predicate, _atom_args, _atom_span = (_setter(Atom, s) for s in ("predicate", "args", "span"))
 _assign_atom, _assign_value, _assign_span = (_setter(Assign, s) for s in ("atom", "value", "span"))
 
-_WORD = re.compile(r"\??[^\s()?]+")
+_WORD = re.compile(r"\??[^\s()?]+|\?")
 _LITERAL = re.compile(r"\(([^()]*)\)|\(\s*not\s*(\([^()]*\))\s*\)", re.IGNORECASE)
-_GROUP = re.compile(r"([^\s-].*?)\s+-\s*(\S+)", re.DOTALL)
+# In a typed list a hyphen may lack its spaces: `?x- block`, `-zone`.
+_ENTRY = re.compile(r"-|\??(?:[^\s()?-]|-+(?=[^\s()?-]))+|\?")
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 # A fact whose words stand one space apart, any fact, or the value of a fluent.
 _FACT = re.compile(r"\(([^\s()]+(?: [^\s()]+)*)\)|(\([^()]*\))|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
@@ -91,32 +92,44 @@ def name(token: Token) -> Name:
 
 
 def terms(text: str, offset: int, source: SourceFile) -> list[Term]:
-    """The words of a text that starts at an offset of the source, as names and variables."""
-    found: list[Term] = []
+    """The words of a text that starts at an offset of the source, as names and variables.
+
+    Raises :class:`Misuse` for a word that is neither.
+    """
     # The usual way to write an atom is one space between words, which str.split takes apart fast.
     # Other white space and `robot?r` take the slow path.
-    if text.isprintable() and text.count("?") == text.count(" ?") + (text[0] == "?"):
-        at = offset
-        for word in text.split(" "):
-            if not word:
-                at += 1
-                continue
-            if word[0] == "?":
-                node = _new(Variable)
-                _variable_text(node, word)
-                _variable_source(node, source)
-                _variable_start(node, at)
-            else:
-                node = _new(Name)
-                _name_text(node, word)
-                _name_source(node, source)
-                _name_start(node, at)
-            found.append(node)
-            at += len(word) + 1
-        return found
+    glued = text.count("?") - text.count(" ?") - (text[0] == "?")
+    if glued or not text.isprintable() or " -" in text or "? " in text or text[-1] == "?":
+        return _terms_slowly(text, offset, source)
+    found: list[Term] = []
+    at = offset
+    for word in text.split(" "):
+        if not word:
+            at += 1
+            continue
+        if word[0] == "?":
+            node = _new(Variable)
+            _variable_text(node, word)
+            _variable_source(node, source)
+            _variable_start(node, at)
+        else:
+            node = _new(Name)
+            _name_text(node, word)
+            _name_source(node, source)
+            _name_start(node, at)
+        found.append(node)
+        at += len(word) + 1
+    return found
+
+
+def _terms_slowly(text: str, offset: int, source: SourceFile) -> list[Term]:
+    found: list[Term] = []
     for match in _WORD.finditer(text):
         word = match.group()
         span = Span(source, offset + match.start(), offset + match.end())
+        if word[0] == "-" or word == "?":
+            hint = "types stand in declarations only" if word == "-" else None
+            raise Misuse("BBT0101", f"expected a name or a variable, found `{word}`", span, hint)
         found.append(Variable(word, span) if word[0] == "?" else Name(word, span))
     return found
 
@@ -167,7 +180,7 @@ def assign(fact: Atom, value: Truth, span: Span) -> Assign:
 def facts(run: Token) -> list[InitElement]:
     """The elements of a run of ground facts ``(p a)`` and values ``(= (f a) 3)``."""
     source, base, true = SOURCE.get(), run.start, Truth.TRUE
-    plain = "?" not in run.text
+    plain = "?" not in run.text and " -" not in run.text
     found: list[InitElement] = []
     for match in _FACT.finditer(run.text):
         start, end = match.span()
@@ -225,23 +238,54 @@ def literals(token: Token) -> Iterator[Atom | Equality | Not]:
             yield Not(_flat(inner[1:-1], Span(source, at, at + len(inner))), span)
 
 
-def groups(text: str, offset: int) -> list[TypedGroup]:
-    """The groups of a text ``a b - t c - u d``."""
+def groups(text: str, offset: int, *, variables: bool) -> tuple[TypedGroup, ...]:
+    """The groups of a typed list ``a b - t c``, of variables or of names.
+
+    Raises :class:`Misuse` where a hyphen has no names before it or no type after it, and for a name
+    among variables.
+    """
     source = SOURCE.get()
     found: list[TypedGroup] = []
-    at = 0
-    for match in _GROUP.finditer(text):
-        start, at = match.span()
-        names = tuple(terms(match[1], offset + start, source))
-        stop = offset + at
-        kind = Name(match[2], _tuple(Span, (source, offset + match.start(2), stop)))
-        found.append(TypedGroup(names, (kind,), _tuple(Span, (source, offset + start, stop))))
-    rest = text[at:].strip()
-    if rest:
-        start = offset + text.index(rest, at)
-        names = tuple(terms(rest, start, source))
-        found.append(TypedGroup(names, (), Span(source, start, start + len(rest))))
-    return found
+    names: list[Term] = []
+    start, typed = offset, False
+    for match in _ENTRY.finditer(text):
+        word, at = match.group(), offset + match.start()
+        if typed:
+            kind = Name(word, Span(source, at, at + len(word)))
+            found.append(TypedGroup(tuple(names), (kind,), Span(source, start, at + len(word))))
+            names, typed = [], False
+        elif word == "-":
+            typed = True
+        else:
+            start = start if names else at
+            names.append(_entry(word, at, source, variables))
+        if (typed and not names) or (word == "-") is not typed:
+            raise Misuse(
+                "BBT0101", f"expected names before a type, found `{word}`", Span(source, at, at + len(word))
+            )
+    end = offset + len(text)
+    if typed:
+        raise Misuse("BBT0101", "expected a type after `-`", Span(source, end, end + 1))
+    if names:
+        found.append(TypedGroup(tuple(names), (), Span(source, start, names[-1].span.end)))
+    return tuple(found)
+
+
+def _entry(word: str, at: int, source: SourceFile, variables: bool) -> Term:
+    if variables is not word.startswith("?") or word == "?":
+        what = "a parameter `?x`" if variables else "a name"
+        hint = f"parameters start with `?`: `?{word}`" if variables else None
+        raise Misuse("BBT0101", f"expected {what}, found `{word}`", Span(source, at, at + len(word)), hint)
+    node = _new(Variable if variables else Name)
+    if variables:
+        _variable_text(node, word)
+        _variable_source(node, source)
+        _variable_start(node, at)
+    else:
+        _name_text(node, word)
+        _name_source(node, source)
+        _name_start(node, at)
+    return node  # type: ignore[no-any-return]
 
 
 def number(text: str, span: Span) -> Number:
