@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
-_TYPES = {"a": ["a1", "a2"], "b": ["b1"], "top": ["a1", "a2", "b1"], "object": ["a1", "a2", "b1", "free"]}
+_TYPES = {"a": ["a1", "a2"], "b": ["b1"], "top": ["a1", "a2", "b1"], "object": ["a1", "a2", "b1"]}
 _PREDICATES = {
     "p": [],
     "q": ["a"],
@@ -96,36 +96,49 @@ def _effect(draw: DrawFn, scope: Scope, depth: int) -> str:
             return f"(probabilistic {' '.join(parts)})"
 
 
+def _precondition(draw: DrawFn, scope: Scope) -> str:
+    """Mostly one that can be met: enough actions are to apply for their effects to meet."""
+    easy = ["()", f"(not {_atom(draw, scope, _FLUENTS)})"]
+    return draw(st.sampled_from([*easy, *easy, _condition(draw, scope, 2)]))
+
+
 def _action(draw: DrawFn, name: str) -> str:
     chosen = draw(st.lists(st.sampled_from(["?x", "?y"]), max_size=2, unique=True))
     scope = {parameter: draw(st.sampled_from(sorted(_TYPES))) for parameter in chosen}
     listed = " ".join(f"{parameter} - {type_}" for parameter, type_ in scope.items())
+    effects = " ".join(_effect(draw, scope, 3) for _ in range(draw(st.integers(1, 4))))
     return (
-        f"(:action {name} :parameters ({listed}) :precondition {_condition(draw, scope, 2)}"
-        f" :effect {_effect(draw, scope, 3)})"
+        f"(:action {name} :parameters ({listed}) :precondition {_precondition(draw, scope)}"
+        f" :effect (and {effects}))"
     )
 
 
 @st.composite
 def lifted_texts(draw: DrawFn) -> str:
-    """A domain with three predicates that change and two that do not, and a problem for it."""
+    """A domain with four predicates that may change and two that do not, and a problem for it."""
     actions = [_action(draw, name) for name in ("one", "two", "three")[: draw(st.integers(1, 3))]]
-    facts = {_atom(draw, {}, list(_PREDICATES)) for _ in range(draw(st.integers(0, 8)))}
+    facts = {_atom(draw, {}, list(_PREDICATES)) for _ in range(draw(st.integers(0, 12)))}
     init = [
-        draw(st.sampled_from([fact, fact, f"(unknown {fact})", f"(not {fact})"])) for fact in sorted(facts)
+        draw(st.sampled_from([fact, fact, fact, f"(unknown {fact})", f"(not {fact})"]))
+        for fact in sorted(facts)
     ]
     predicates = " ".join(
         f"({' '.join([name, *(f'?{i} - {type_}' for i, type_ in enumerate(types))])})"
         for name, types in _PREDICATES.items()
     )
+    goal = _condition(draw, {}, 2)
+    if draw(st.integers(0, 3)):
+        # One that can be reached whatever comes out.
+        atom = _atom(draw, {}, _FLUENTS)
+        goal = f"(or {atom} (not {atom}) (unknown {atom}) {goal})"
     return "\n".join(
         [
             "(define (domain d) (:types top - object a b - top)",
             f"(:predicates {predicates})",
-            "(:constants a1 a2 - a b1 - b free)",
+            "(:constants a1 a2 - a b1 - b)",
             *actions,
             ")",
             f"(define (problem q) (:domain d) (:init {' '.join(init)})",
-            f"(:goal {_condition(draw, {}, 2)}))",
+            f"(:goal {goal}))",
         ]
     )

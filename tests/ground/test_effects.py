@@ -202,3 +202,35 @@ def test_grounding_twice_gives_the_same() -> None:
     text = _EFFECT.format(effect="(and (p) (q) (r) (s a) (s b) (s c))", init="", metric="")
     first, second = (ground(model_of(text), Report(), Limits()) for _ in range(2))
     assert first == second
+
+
+def test_the_guards_of_an_action_kept_early_matter_when_their_effect_turns_out_to() -> None:
+    task = task_of(
+        """(define (domain d) (:predicates (p) (q) (r) (one) (two))
+          (:action first :effect (and (when (one) (p)) (when (two) (q))))
+          (:action last :precondition (q) :effect (r))
+          (:action toggle :effect (oneof (and (one) (not (two))) (and (two) (not (one))))))
+        (define (problem x) (:domain d) (:init) (:goal (and (p) (r))))"""
+    )
+    assert [variable.name for variable in task.variables] == ["one()", "p()", "q()", "r()", "two()"]
+
+
+def test_quantifiers_side_by_side_may_use_one_name() -> None:
+    task = task_of(
+        """(define (domain d) (:predicates (p ?x) (q ?x) (done)) (:constants a b)
+          (:action set :effect (and (p a) (q b)))
+          (:action end :precondition (and (exists (?x) (p ?x)) (exists (?x) (q ?x))) :effect (done)))
+        (define (problem x) (:domain d) (:init) (:goal (done)))"""
+    )
+    assert describe(task, task.action_by_name["end()"].precondition) == "(p(a) and q(b))"
+
+
+def test_an_object_outside_the_declared_type_of_a_predicate_stays_outside_that_of_an_action() -> None:
+    task = task_of(
+        """(define (domain d) (:types small) (:predicates (p ?x - small) (q ?x - object))
+          (:constants a - small b)
+          (:action any :parameters (?x) :effect (p ?x))
+          (:action few :parameters (?x - small) :precondition (p ?x) :effect (q ?x)))
+        (define (problem x) (:domain d) (:init) (:goal (and (q a) (forall (?x) (p ?x)))))"""
+    )
+    assert [action.name for action in task.actions] == ["any(a)", "any(b)", "few(a)"]
