@@ -422,10 +422,13 @@ class Builder:
     def comparison(self, children: list[Any]) -> ast.Equality | ast.Unsupported:
         head, left, right, close = children
         if head.kind == "EQUAL":
-            sides = [ast.Name(s.text, s.span) if isinstance(s, ast.Number) else s for s in (left, right)]
             numbers = isinstance(left, ast.Number) and isinstance(right, ast.Number)
-            if not numbers and all(isinstance(s, ast.Name | ast.Variable) for s in sides):
+            sides = [ast.Name(s.text, s.span) if isinstance(s, ast.Number) else s for s in (left, right)]
+            terms = [isinstance(side, ast.Name | ast.Variable) for side in sides]
+            if all(terms) and not numbers:
                 return ast.Equality(sides[0], sides[1], between(head, close))
+            if any(isinstance(side, ast.Name | ast.Variable | ast.Unsupported) for side in (left, right)):
+                return _unsupported("object fluent", head, close)
         return _unsupported("numeric comparison", head, close)
 
     def preference(self, children: list[Any]) -> ast.Unsupported:

@@ -131,9 +131,7 @@ class Setter:
         """Write one item, on the current line or on a new one."""
         items = doc.items or ()
         item = items[number]
-        stays = number < doc.glued or (
-            doc.filled and number > 0 and len(self._line) + 1 + len(item.flat) + tail <= WIDTH
-        )
+        stays = number < doc.glued or (doc.filled and len(self._line) + 1 + len(item.flat) + tail <= WIDTH)
         first = number == 0 and not doc.open
         if (first or stays) and not self._ended:
             if not first and self._line.strip() and not self._line.endswith("("):

@@ -138,7 +138,10 @@ class _Docs:
         """``(?x ?y - t)``, after a keyword or not."""
         place = self._word(word, after, span) if word else None
         if word and place is None:
-            return Doc(f"{word} (", self.groups(entries), ")", span._replace(start=after, end=after))
+            # Not written: it goes before what follows, and after the comments before that.
+            rest = re.compile(r"\s*").match(self._text, after)
+            start = rest.end() if rest else after
+            return Doc(f"{word} (", self.groups(entries), ")", span._replace(start=start, end=start))
         start = place.end if place else after
         last = entries[-1].span.end if entries else start
         around = self._parentheses(start, last, span)

@@ -32,10 +32,9 @@ def comments(source: SourceFile) -> tuple[Comment, ...]:
     found = []
     for match in _COMMENT.finditer(text):
         start = match.start()
-        line = max(text.rfind("\n", 0, start), text.rfind("\r", 0, start)) + 1
+        before = text[text.rfind("\n", 0, start) + 1 : start].rpartition("\r")[2]
         content = match.group().rstrip()
-        span = Span(source, start, start + len(content))
-        found.append(Comment(content, not text[line:start].strip(), span))
+        found.append(Comment(content, not before.strip(), Span(source, start, start + len(content))))
     return tuple(found)
 
 
