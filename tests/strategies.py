@@ -58,6 +58,7 @@ HOSTILE_NAMES = st.one_of(
     st.text(st.characters(exclude_categories=["Cs"]), max_size=8),
 )
 CONTROL_KINDS: list[ControlKind] = ["sequence", "fallback", "skipper"]
+BODY_KINDS: list[Literal["sequence", "fallback", "skipper"]] = ["sequence", "fallback", "skipper"]
 STATUSES: list[Status] = ["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
 
 
@@ -192,7 +193,7 @@ def _body(
         case "action":
             return BodyAction(draw(st.sampled_from(actions)).name)
         case _:
-            kind = draw(st.sampled_from(CONTROL_KINDS))
+            kind = draw(st.sampled_from(BODY_KINDS))
             count = draw(st.integers(1, 3))
             passives = [passive or (kind == "skipper" and i < count - 1) for i in range(count)]
             return BodyControl(kind, tuple(_body(draw, variables, actions, depth - 1, p) for p in passives))
@@ -218,6 +219,10 @@ def nodes(draw: st.DrawFn, task: Task, depth: int = 3) -> Node:
                 action = draw(st.sampled_from(task.actions)).name
                 return ActionNode(name, action, draw(st.booleans()), draw(st.booleans()), reason=draw(labels))
             case _:
+                if not draw(st.integers(0, 4)):
+                    child = node(level - 1, passive)
+                    attempts = draw(st.integers(1, 3))
+                    return ControlNode(name, "retry", (child,), draw(labels), attempts=attempts)
                 kind = draw(st.sampled_from(CONTROL_KINDS))
                 count = draw(st.integers(1, 3))
                 children = tuple(

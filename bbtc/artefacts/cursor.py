@@ -161,6 +161,12 @@ class At:
             raise self._wrong("true or false")
         return self.value
 
+    def count(self) -> int:
+        """A whole number from 1 to a million."""
+        if not isinstance(self.value, int) or isinstance(self.value, bool) or not 1 <= self.value <= 10**6:
+            raise self._wrong("a whole number from 1 to 1000000")
+        return self.value
+
     def word(self, *choices: str) -> str:
         """One of a few strings."""
         text = self.string()

@@ -74,6 +74,8 @@ def _node_to_json(node: Node, task: Task) -> Json:
     match node:
         case ControlNode():
             value["type"] = node.kind
+            if node.attempts is not None:
+                value["attempts"] = node.attempts
         case ConditionNode():
             value |= {"type": "condition", "condition": condition_to_json(node.condition, task.variables)}
         case ActionNode():
@@ -159,12 +161,15 @@ class _Reader:
             return ConditionNode("", TRUE)
 
     def _control(self, at: At, level: int, kind: ControlKind) -> ControlNode:
-        members = at.members(["id", "type", "children"], _LABELS)
+        required = ["id", "type", "children", *(["attempts"] if kind == "retry" else [])]
+        members = at.members(required, _LABELS)
+        attempts = members["attempts"].count() if kind == "retry" else None
         name = members["id"].string()
         children: list[Node] = []
         for child in children_at(members["children"], level):  # a loop: few frames for each level
             children.append(self.node(child, level + 1))  # noqa: PERF401
-        return ControlNode(name, kind, tuple(children), *_labels(members))
+        label, template, reason = _labels(members)
+        return ControlNode(name, kind, tuple(children), label, template, reason, attempts)
 
     def _condition(self, at: At) -> ConditionNode:
         members = at.members(["id", "type", "condition"], _LABELS)

@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
-from bbtc.belief.tick import STARTED, Status, compile_tick
+from bbtc.belief.tick import STARTED, Status, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, Node, actions_of
@@ -60,6 +60,7 @@ def explore(
             transitions[node.action] = compile_action(task.action_by_name[node.action])
         steps.append(transitions[node.action])
     tick = compile_tick(task, root)
+    on_start = memory_of(root).started
     index: dict[State, int] = {}
     states: list[State] = []
 
@@ -83,7 +84,7 @@ def explore(
             edges.append(())
             continue
         action = returned - STARTED
-        finished = state.finished | 1 << action if actions[action].latched else state.finished
+        finished = state.finished + on_start[action]  # a latched node that starts has not finished
         status.append(Status.RUNNING)
         started.append(action)
         edges.append(tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values)))

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from bbtc.belief.state import State
-from bbtc.belief.tick import Status, compile_tick
+from bbtc.belief.tick import Status, compile_tick, memory_of
 from bbtc.ground.condition import Condition, conjuncts, evaluate
 from bbtc.ground.task import Task
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of
 
 
 class Failing(NamedTuple):
@@ -29,6 +30,8 @@ class FailureFinder:
         self._seen: list[tuple[ConditionNode | ActionNode, int]] = []
         self._task = task
         self._tick = compile_tick(task, root, self._observe)
+        counters = memory_of(root).counters
+        self._counters = {node.id: counters[i] for i, node in enumerate(actions_of(root)) if counters[i]}
 
     def _observe(self, node: Node, status: int) -> None:
         if not isinstance(node, ControlNode) and status < Status.SUCCESS:
@@ -46,8 +49,24 @@ class FailureFinder:
         found = [
             Failing(node.id, self._condition(node, state), Status(status), self._depth[node.id])
             for node, status in reversed(self._seen)
+            if isinstance(node, ConditionNode) or node.guarded
         ]
         return sorted(found, key=lambda f: (f.status != root, -f.depth))
+
+    def used_up(self, state: State) -> str | None:
+        """The retry node that refused an action for want of attempts; None if none did."""
+        self._seen.clear()
+        self._tick(state.values, state.finished)
+        for node, status in self._seen:
+            if not isinstance(node, ActionNode) or status != Status.FAILURE:
+                continue
+            precondition = self._task.action_by_name[node.action].precondition
+            if node.guarded and evaluate(precondition, state.values) is not Truth.TRUE:
+                continue
+            for counter in self._counters.get(node.id, ()):
+                if counter.used_up(state.finished):
+                    return counter.node
+        return None
 
     def _condition(self, node: ConditionNode | ActionNode, state: State) -> Condition:
         if isinstance(node, ConditionNode):

@@ -20,8 +20,8 @@ class FailureShare:
     """A part of the failure probability and what stopped the runs of that part.
 
     ``status`` is failure where ``condition`` was false and running where it was unknown and
-    nothing observed it (blocked). ``condition`` is None where no condition failed in the last
-    tick (an empty control node).
+    nothing observed it (blocked). ``condition`` is None where ``node`` is a retry node whose
+    attempts are used up, and where no condition failed in the last tick (an empty control node).
     """
 
     node: str
@@ -102,7 +102,10 @@ def _shares(task: Task, root: Node, chain: Chain, visits: list[Fraction | None])
             continue
         failing = finder.failing(chain.states[state])
         key: tuple[str, Condition | None, Status] = (root.id, None, chain.status[state])
-        if failing:
+        used_up = finder.used_up(chain.states[state])
+        if used_up is not None:
+            key = (used_up, None, chain.status[state])
+        elif failing:
             key = (failing[0].node, failing[0].condition, failing[0].status)
         shares[key] = shares.get(key, Fraction(0)) + probability
     order = {node.id: position for position, node in enumerate(walk(root))}

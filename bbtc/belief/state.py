@@ -15,8 +15,9 @@ Values: TypeAlias = bytes
 
 
 class State(NamedTuple):
-    """A physical state: the values of the variables, and which latched action nodes have
-    finished (bit i stands for the tree's i-th action node from the left)."""
+    """A physical state: the values of the variables, and what the tree remembers: which latched
+    action nodes have finished (bit i stands for the i-th from the left), and how many attempts its
+    retry nodes have made (:class:`bbtc.belief.tick.Memory`)."""
 
     values: Values
     finished: int

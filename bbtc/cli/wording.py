@@ -9,7 +9,7 @@ from bbtc.belief.tick import Status
 from bbtc.ground.describe import describe
 from bbtc.kleene import Truth
 from bbtc.plan.result import Plan, Refinement
-from bbtc.tree.nodes import Tree
+from bbtc.tree.nodes import Tree, retries_of
 
 _LONGEST_FRACTION = 25
 
@@ -78,9 +78,12 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
         lines.append(f"blocked   {exact(figures.blocked)}")
     if figures.endless:
         lines.append(f"endless   {exact(figures.endless)}")
+    attempts = {node.id: number for node, number in retries_of(tree.root)}
     for share in figures.failures:
         what = "no condition failed"
-        if share.condition is not None:
+        if share.condition is None and share.node in attempts:
+            what = f"all {counted(attempts[share.node], 'attempt')} used up"
+        elif share.condition is not None:
             word = "unknown" if share.status is Status.RUNNING else "false"
             what = f"{describe(tree.task, share.condition)} is {word}"
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")

@@ -98,6 +98,7 @@ class _Writer:
         self.action_trees: dict[tuple[str, bytes, Guard | None], Element] = {}
         self.condition_trees: dict[Condition, Element] = {}
         self.subtree_ports: dict[str, tuple[str, ...]] = {}
+        self.counters: dict[str, str] = {}
         self.conditions = ConditionWriter(
             self.task, self.names.interface, self.names.ids, self.names.values, self.tree_ids
         )
@@ -108,7 +109,7 @@ class _Writer:
         main = SubElement(document, "BehaviorTree", ID=main_id)
         main.set("_description", self._headline())
         guarded = self._written(fit(self.tree.root, ENGINE), _Place(main_id))
-        main.append(_until_blocked(guarded))
+        main.append(_until_blocked(guarded, list(self.counters.values())))
         document.extend(self.hoisted)
         document.extend(self.condition_trees.values())
         document.extend(self.conditions.trees.values())
@@ -129,6 +130,10 @@ class _Writer:
     def _written(self, node: Node, place: _Place) -> Element:
         match node:
             case ControlNode():
+                if node.attempts is not None:
+                    counter = self.counters.setdefault(node.id, f"@attempts_{len(self.counters) + 1}")
+                    place = place.counting(f"{counter} < {node.attempts}", f"{counter} += 1")
+                    return self._written(node.children[0], place)
                 if place.level >= _DEEPEST_XML:
                     return self._own_tree(node, place)
                 element = _control(node.kind, [self._written(child, place.down()) for child in node.children])
@@ -149,7 +154,7 @@ class _Writer:
         tree_id = self.tree_ids.take(f"{place.tree_id}Part", seed=node.id)
         tree = Element("BehaviorTree", ID=tree_id)
         self.hoisted.append(tree)
-        tree.append(self._written(node, _Place(tree_id)))
+        tree.append(self._written(node, place.inside(tree_id)))
         return Element("SubTree", ID=tree_id)
 
     def _condition(self, node: ConditionNode, place: _Place) -> Element:
@@ -187,6 +192,8 @@ class _Writer:
         guard = None
         if condition is not None:
             guard = self.conditions.write(condition, binding)
+        if place.counters:
+            guard = _attempt(guard, place.counters)
         suffix = ("Once" if node.latched else "Again") + ("WhenReady" if guard is not None else "")
         key = (suffix, tostring(tag), None if guard is None else tostring(guard))
         if key not in self.action_trees:
@@ -228,14 +235,29 @@ class _Writer:
 class _Place:
     """Where in a BehaviorTree the writer is. SubTree names are unique within one."""
 
-    def __init__(self, tree_id: str, level: int = 0, uses: dict[str, int] | None = None) -> None:
+    def __init__(
+        self,
+        tree_id: str,
+        level: int = 0,
+        uses: dict[str, int] | None = None,
+        counters: tuple[tuple[str, str], ...] = (),
+    ) -> None:
         self.tree_id = tree_id
         self.level = level
+        self.counters = counters
         self._uses = {} if uses is None else uses
 
     def down(self) -> _Place:
         """One level further down."""
-        return _Place(self.tree_id, self.level + 1, self._uses)
+        return _Place(self.tree_id, self.level + 1, self._uses, self.counters)
+
+    def counting(self, test: str, count: str) -> _Place:
+        """Below a retry node: scripts that test for an attempt left, and count one."""
+        return _Place(self.tree_id, self.level, self._uses, (*self.counters, (test, count)))
+
+    def inside(self, tree_id: str) -> _Place:
+        """At the top of a BehaviorTree of its own."""
+        return _Place(tree_id, counters=self.counters)
 
     def unique(self, label: str) -> str:
         """The label; with a number from its second use on."""
@@ -253,7 +275,7 @@ def _control(kind: ControlKind, children: list[Element]) -> Element:
     match kind:
         case "sequence":
             return Element("AlwaysSuccess")
-        case "fallback":
+        case "fallback" | "retry":
             return Element("AlwaysFailure")
         case "skipper":
             running = Element("KeepRunningUntilFailure")
@@ -263,12 +285,23 @@ def _control(kind: ControlKind, children: list[Element]) -> Element:
             assert_never(kind)
 
 
-def _until_blocked(root: Element) -> Element:
+def _attempt(guard: Element | None, counters: tuple[tuple[str, str], ...]) -> Element:
+    """What must succeed before an action below retry nodes starts; then it is an attempt."""
+    left = Element("ScriptCondition", code=" && ".join(test for test, _ in counters))
+    made = Element("Script", code="; ".join(count for _, count in counters))
+    return control("sequence", [*([] if guard is None else [guard]), left, made])
+
+
+def _until_blocked(root: Element, counters: list[str]) -> Element:
     """The tree, and FAILURE as soon as it is running while no action is: nothing can change then,
-    and a loop that ticks while RUNNING would never end."""
+    and a loop that ticks while RUNNING would never end. Counters are set to 0 in the first tick."""
     outer = control("skipper", [])
     outer.set("name", "until blocked")
     ticked = control("sequence", [Element("Script", code="@acting := false"), root])
+    if counters:
+        once = Element("RunOnce", then_skip="false")
+        SubElement(once, "Script", code="; ".join(f"{counter} := 0" for counter in counters))
+        ticked.insert(0, once)
     blocked = Element("Precondition", {"if": "!@acting", "else": "RUNNING"})
     SubElement(blocked, "AlwaysFailure", name="blocked: nothing can observe what is unknown")
     outer.extend([ticked, blocked])

@@ -41,6 +41,9 @@ def control(kind: ControlKind, children: Sequence[Element]) -> Element:
             element = Element("ReactiveFallback")
         case "skipper":
             element = Element("Parallel", success_count="1", failure_count="1")
+        case "retry":  # attempts are counted where actions start
+            (element,) = children
+            return element
         case _:
             assert_never(kind)
     element.extend(children)

@@ -23,7 +23,9 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode,
 
 Kind: TypeAlias = Literal["control", "condition", "action", "expanded", "collapsed"]
 
-SYMBOLS: Mapping[ControlKind, str] = MappingProxyType({"sequence": "→", "fallback": "?", "skipper": "⇒"})
+SYMBOLS: Mapping[ControlKind, str] = MappingProxyType(
+    {"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻"}
+)
 
 FILL: Mapping[Kind, str] = MappingProxyType(
     {
@@ -118,7 +120,8 @@ def _lines(tree: Tree, node: Node) -> tuple[str, ...]:
     labels = [label for label in (node.name, node.template) if label is not None]
     match node:
         case ControlNode():
-            pass
+            if node.attempts is not None:
+                labels.append(f"at most {node.attempts}")
         case ConditionNode():
             labels.append(describe(tree.task, node.condition))
         case ActionNode():
@@ -132,7 +135,7 @@ def _note(tree: Tree, node: Node) -> str:
     text: str
     match node:
         case ControlNode():
-            text = node.kind
+            text = node.kind if node.attempts is None else f"{node.kind}, at most {node.attempts} actions"
         case ConditionNode():
             text = f"condition {describe(tree.task, node.condition)}"
         case ActionNode():

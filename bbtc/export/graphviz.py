@@ -32,13 +32,16 @@ from bbtc.export.diagram import (
 )
 from bbtc.export.names import printable
 from bbtc.export.registry import Figures, Option, OptionValue
-from bbtc.tree.nodes import Tree
+from bbtc.tree.nodes import ControlKind, Tree
 
 FONT = "Helvetica,Arial,sans-serif"
 
 _SECONDS = 60  # that a Graphviz program may take
 _PROGRAMS = ("dot", "graphviz-pure")
-_SKIPPER_STAND_IN = "»"  # the fonts inside graphviz-pure lack the double arrow
+_STAND_INS: dict[ControlKind, str] = {
+    "skipper": "»",
+    "retry": "@",
+}  # the fonts inside graphviz-pure lack these arrows
 _PLAIN_ID = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
 TEMPLATES = Option(
@@ -236,7 +239,8 @@ def _run_graphviz(programs: tuple[str, ...], form: str, text: str, *arguments: s
             continue
         drawn = text
         if (program, form) == ("graphviz-pure", "png"):
-            drawn = text.replace(SYMBOLS["skipper"], _SKIPPER_STAND_IN)
+            for kind, stand_in in _STAND_INS.items():
+                drawn = drawn.replace(SYMBOLS[kind], stand_in)
         try:
             run = subprocess.run(  # noqa: S603 (a program of a fixed name, its input on stdin)
                 [path, f"-T{form}", *arguments],

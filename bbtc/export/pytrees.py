@@ -20,7 +20,16 @@ from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.export.shape import fit, normal, words_of
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlNode,
+    Node,
+    Tree,
+    actions_of,
+    retries_of,
+    walk,
+)
 
 _DEEPEST_EXPRESSION = 10  # levels of nodes in one function; a deeper subtree gets a function
 
@@ -68,6 +77,8 @@ class _Writer:
         self.conditions = ConditionCode()
         self.world = WorldWriter(tree, self.names.interface, self.names.methods, self.conditions)
         self.branches: list[list[str]] = []
+        retries = [node for node, _ in retries_of(self.root)]
+        self.tried = {action.id for node in retries for action in actions_of(node)}
 
     def module(self) -> str:
         """The source text."""
@@ -78,6 +89,8 @@ class _Writer:
         nodes = {"Condition", "Action", "Latch", "StopWhenBlocked", "run", *self.conditions.used, *composites}
         if "skipper" in composites:
             nodes.add("Skipper")
+        if "retry" in composites:
+            nodes |= {"Retry", "Try"}
         simulation = ["When", "Outcome", "Factor", "draw", "happen", "World", "in_words", "simulate"]
         blocks = [
             self._protocol(),
@@ -128,7 +141,8 @@ class _Writer:
                 if level > _DEEPEST_EXPRESSION:
                     return self._branch(node)
                 children = [self._code(child, level + 1) for child in node.children]
-                return call(node.kind, literal(_label(node)), *children)
+                bound = [] if node.attempts is None else [str(node.attempts)]
+                return call(node.kind, literal(_label(node)), *bound, *children)
             case ConditionNode():
                 condition = normal(self.task, node.condition)
                 label = node.name or words_of(self.task, condition).short
@@ -155,7 +169,7 @@ class _Writer:
             items.append(Prefixed("guard=", self._test(guard)))
         if not node.latched:
             items.append("keep=False")
-        return call("Latch", *items)
+        return call("Try" if node.id in self.tried else "Latch", *items)
 
     def _test(self, condition: Condition) -> Code:
         return _thunk(self.conditions.write(condition, self._read))
@@ -179,7 +193,7 @@ def _label(node: ControlNode) -> str:
 
 def _imports(composites: set[str]) -> list[str]:
     classes = {"skipper": "Composite", "fallback": "Selector", "sequence": "Sequence"}
-    used = ", ".join(sorted(classes[kind] for kind in composites))
+    used = ", ".join(sorted(classes[kind] for kind in composites if kind in classes))
     lines = _IMPORTS.splitlines()
     if used:
         lines.insert(lines.index(_AFTER_COMPOSITES), f"from py_trees.composites import {used}")

@@ -16,13 +16,14 @@ from typing_extensions import assert_never
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
 
-ControlKind: TypeAlias = Literal["sequence", "fallback", "skipper"]
+ControlKind: TypeAlias = Literal["sequence", "fallback", "skipper", "retry"]
 
 
 @dataclass(frozen=True, slots=True)
 class ControlNode:
     """Sequence (→), Fallback (?) or Skipper (⇒): goes on to the next child while the child
-    returns success, failure or running, respectively.
+    returns success, failure or running, respectively. Retry (↻) has one child and returns what that
+    returns; once ``attempts`` actions have been started below it, any further one fails instead.
 
     ``template`` is the ground template this subtree was expanded from, ``reason`` the condition
     it was inserted for, ``name`` a label of its own.
@@ -34,6 +35,7 @@ class ControlNode:
     name: str | None = None
     template: str | None = None
     reason: str | None = None
+    attempts: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +102,13 @@ def walk(node: Node) -> Iterator[Node]:
                 pass
             case _:
                 assert_never(node)
+
+
+def retries_of(node: Node) -> Iterator[tuple[ControlNode, int]]:
+    """The retry nodes, parents before children, from left to right, each with its attempts."""
+    for each in walk(node):
+        if isinstance(each, ControlNode) and each.attempts is not None:
+            yield each, each.attempts
 
 
 def actions_of(node: Node) -> Iterator[ActionNode]:

@@ -44,8 +44,8 @@ class Problem:
 
 def check_tree(tree: Tree) -> None:
     """Raise :class:`BbtcError` with every rule the tree breaks: ids are unique, control nodes have
-    children, actions and variables exist in the task, only the last child of a Skipper contains
-    actions, no more than :data:`MAX_DEPTH` levels."""
+    children (a retry exactly one, and attempts), actions and variables exist in the task, only the
+    last child of a Skipper contains actions, no more than :data:`MAX_DEPTH` levels."""
     problems = [Diagnostic(p.code, p.message, hint=p.hint) for p in tree_problems(tree)]
     if problems:
         raise BbtcError(problems)
@@ -67,8 +67,14 @@ def tree_problems(tree: Tree) -> Iterator[Problem]:
             case ActionNode():
                 if node.action not in task.action_by_name:
                     yield Problem("BBT0606", path, f"no action is called '{node.action}'")
+            case ControlNode(kind="retry"):
+                if node.attempts is None or node.attempts < 1:
+                    yield Problem("BBT0613", path, f"retry '{node.id}' allows no attempts")
+                if len(node.children) > 1:
+                    yield Problem("BBT0613", path, f"retry '{node.id}' has more than one child")
             case ControlNode():
-                pass
+                if node.attempts is not None:
+                    yield Problem("BBT0613", path, f"{node.kind} '{node.id}' counts attempts")
             case _:
                 assert_never(node)
 

@@ -151,7 +151,21 @@ def known_names() -> set[str]:
 
 _ALL = [
     *("all_of", "any_of", "negated", "Condition", "Action", "Latch", "Skipper", "sequence", "fallback"),
-    *("skipper", "StopWhenBlocked", "run", "Fact", "State", "T", "When", "Outcome", "Factor", "draw"),
+    *(
+        "skipper",
+        "Retry",
+        "Try",
+        "retry",
+        "StopWhenBlocked",
+        "run",
+        "Fact",
+        "State",
+        "T",
+        "When",
+        "Outcome",
+        "Factor",
+        "draw",
+    ),
     *("happen", "World", "in_words", "simulate"),
 ]
 

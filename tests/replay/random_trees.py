@@ -103,6 +103,9 @@ class _Grower:
             return self.condition() if passive or self.rng.random() < 0.3 else self.action()
         if not passive and self.rng.random() < 0.5:
             return self.planned(level)
+        if not passive and self.rng.random() < 0.15:
+            below = self.node(level - 1, False)
+            return ControlNode(f"n{next(self.ids)}", "retry", (below,), attempts=self.rng.randint(1, 3))
         kind = self.rng.choice(KINDS)
         width = self.rng.choice([0, 1, 2, 2, 2, 3, 3])
         closed = [passive or (kind == "skipper" and i < width - 1) for i in range(width)]

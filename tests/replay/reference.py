@@ -49,7 +49,9 @@ class Ticking:
     task: Task
     values: Values
     finished: set[str] = field(default_factory=set)
+    tries: dict[str, int] = field(default_factory=dict)
     started: ActionNode | None = None
+    around: list[ControlNode] = field(default_factory=list)
 
     def tick(self, node: Node) -> str:
         """The status a node returns; :attr:`started` is the action it started."""
@@ -62,10 +64,19 @@ class Ticking:
                 allowed = value_of(self.task.action_by_name[node.action].precondition, self.values)
                 if allowed != "T":
                     return STATUS[allowed]
+            if any(self.tries.get(retry.id, 0) == retry.attempts for retry in self.around):
+                return "failure"
             assert self.started is None, "a tick starts at most one action"
             self.started = node
+            for retry in self.around:
+                self.tries[retry.id] = self.tries.get(retry.id, 0) + 1
             return "running"
         assert isinstance(node, ControlNode)
+        if node.kind == "retry":
+            self.around.append(node)
+            status = self.tick(node.children[0])
+            self.around.pop()
+            return status
         for child in node.children:
             status = self.tick(child)
             if status != GOES_ON[node.kind]:
@@ -114,7 +125,7 @@ def _lively_values(run: Ticking, root: Node, rng: random.Random) -> Values:
     # Random outcomes end a tree soon: of a few, take one that keeps it going, most of the time.
     for _ in range(rng.choice([1, 6, 6, 6])):
         values = _random_values(run.task, rng, run.values)
-        ahead = Ticking(run.task, values, run.finished)
+        ahead = Ticking(run.task, values, run.finished, dict(run.tries))
         ahead.tick(root)
         if ahead.started is not None:
             break

@@ -127,6 +127,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -160,6 +204,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 class StopWhenBlocked(Decorator):
