@@ -126,12 +126,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
-def test_the_wheel_holds_the_package_and_the_grammar_and_nothing_else(wheel: Path) -> None:
+def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         grammar = archive.read("bbtc/grammar/bbtc.lark")
     assert grammar == (REPOSITORY / "grammar" / "bbtc.lark").read_bytes()
     assert "bbtc/py.typed" in names
+    assert {f"bbtc/errors/{code}.md" for code in CODES} <= names
     modules = {str(path.relative_to(REPOSITORY).as_posix()) for path in SOURCES}
     assert modules <= names
     tops = {name.partition("/")[0] for name in names}

@@ -150,6 +150,9 @@ def reached(model: md.Model) -> Reached:
     for choice in model.init.choices:
         for leaf in settings(choice):
             result.values[leaf.predicate, leaf.value] = None
+            if isinstance(choice, me.Choice) and choice.oneof:
+                # Nobody knows which of them it is.
+                result.values[leaf.predicate, Truth.UNKNOWN] = None
     for clause in model.init.clauses:
         # Uncertain: any of the atoms may have any value.
         for atom in mf.atoms(clause.condition):
@@ -177,7 +180,18 @@ def _close(model: md.Model, result: Reached) -> None:
             if schema.name in result.actions or result.possible(schema.precondition):
                 result.actions[schema.name] = None
                 _apply(schema.effect, result)
+                _tell(observed(schema), result)
+        for sensor in model.sensors:
+            if result.possible(sensor.condition):
+                _tell({atom.predicate for atom in mf.atoms(sensor.sensed)}, result)
         grown = len(result.values) + len(result.actions) > before
+
+
+def _tell(predicates: set[str], result: Reached) -> None:
+    """What was unknown turns out to be true, or false."""
+    for name in sorted(predicates):
+        if (name, Truth.UNKNOWN) in result.values:
+            result.values.update({(name, value): None for value in (Truth.TRUE, Truth.FALSE)})
 
 
 def _apply(effect: me.Effect, result: Reached) -> None:

@@ -1,0 +1,109 @@
+"""The pages of the codes: each exists, and its examples show what it says.
+
+A page holds a wrong and a right text, or console snippets (run by ``test_snippets``), or, where no
+small example would show it everywhere, words alone.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bbtc import pipeline
+from bbtc.analysis.check import check
+from bbtc.codes import CODES
+from bbtc.diagnostics import BbtcError, Diagnostic, Report
+from bbtc.limits import Limits
+from bbtc.source import SourceFile
+from bbtc.syntax.parser import parse
+
+REPOSITORY = Path(__file__).parents[2]
+PAGES = REPOSITORY / "docs" / "errors"
+EXAMPLE = re.compile(r"^## (Wrong|Right)\n\n```pddl\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+WORDS_ALONE = {"BBT0408", "BBT0502", "BBT0613", "BBT0702", "BBT0703", "BBT0705", "BBT0706"}
+
+
+def examples(code: str) -> dict[str, str]:
+    """The wrong and the right text of a page, if it has them."""
+    return dict(EXAMPLE.findall((PAGES / f"{code}.md").read_text("utf-8")))
+
+
+WITH_EXAMPLES = [code for code in CODES if (PAGES / f"{code}.md").exists() and examples(code)]
+
+
+def diagnostics(text: str) -> list[Diagnostic]:
+    """All that ``check`` and ``compile`` tell about a text."""
+    report = Report()
+    try:
+        document = parse(SourceFile("example.pddl", text), report)
+        report.raise_errors()
+        inputs = pipeline.select([document], report)
+        assert inputs is not None
+        model = pipeline.resolve_model(inputs, report, checks=False)
+        for diagnostic in check(model):
+            report.add(diagnostic)
+        if inputs.problem is not None:
+            pipeline.ground_model(model, report, Limits())
+    except BbtcError as error:
+        for diagnostic in error.diagnostics:
+            report.add(diagnostic)
+    return list(report)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_has_a_page_with_its_title(code: str) -> None:
+    text = (PAGES / f"{code}.md").read_text("utf-8")
+    assert text.startswith(f"# {code}: {CODES[code]}\n\n")
+    shown = f"[{code}]" in text and "```console" in text
+    assert shown or set(examples(code)) == {"Wrong", "Right"} or code in WORDS_ALONE
+
+
+def test_no_page_is_left_over() -> None:
+    assert {path.stem for path in PAGES.glob("BBT*.md")} == CODES.keys()
+
+
+def test_the_index_lists_every_code() -> None:
+    index = (PAGES / "README.md").read_text("utf-8")
+    assert dict(re.findall(r"^\| \[(BBT\d{4})\]\(\1\.md\) \| (.*) \|$", index, re.MULTILINE)) == CODES
+
+
+@pytest.mark.parametrize("code", WITH_EXAMPLES)
+def test_the_wrong_example_gives_exactly_this_code(code: str) -> None:
+    assert {diagnostic.code for diagnostic in diagnostics(examples(code)["Wrong"])} == {code}
+
+
+@pytest.mark.parametrize("code", WITH_EXAMPLES)
+def test_the_right_example_gives_nothing(code: str) -> None:
+    assert [diagnostic.render() for diagnostic in diagnostics(examples(code)["Right"])] == []
+
+
+def explain(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run ``bbtc explain``."""
+    return subprocess.run(
+        [sys.executable, "-m", "bbtc.cli.main", "explain", *arguments],
+        cwd=REPOSITORY,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+
+
+@pytest.mark.parametrize("spelling", ["BBT0202", "bbt0202", "0202", "202"])
+def test_explain_prints_the_page(spelling: str) -> None:
+    done = explain(spelling)
+    assert (done.returncode, done.stdout) == (0, (PAGES / "BBT0202.md").read_text("utf-8"))
+
+
+def test_explain_without_a_code_lists_all() -> None:
+    assert [line.split("  ", 1) for line in explain().stdout.splitlines()] == [list(c) for c in CODES.items()]
+
+
+def test_an_unknown_code_is_wrong_usage_and_gets_near_ones() -> None:
+    done = explain("BBT0225")
+    assert done.returncode == 2
+    assert "BBT0224" in done.stderr or "BBT0222" in done.stderr
