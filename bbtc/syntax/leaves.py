@@ -58,6 +58,14 @@ _TOKEN = re.compile(r"[()]|[^\s()]+")
 # A fact whose words stand one space apart, any fact, or the value of a fluent.
 _FACT = re.compile(r"\(([^\s()]+(?: [^\s()]+)*)\)|(\([^()]*\))|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
 
+# Words that head a form, and no flat atom: _ATOM_HEAD in the grammar.
+_HEADS = frozenset(
+    (
+        *("and", "or", "not", "imply", "when", "forall", "exists", "oneof", "probabilistic", "either"),
+        *("increase", "decrease", "assign", "scale-up", "scale-down", "preference"),
+    )
+)
+
 NUMBER_LENGTH = 200
 """Longest number, in characters."""
 EXPONENT_LIMIT = 300
@@ -150,8 +158,14 @@ def flat(token: Token) -> Atom:
 
 
 def atom(token: Token) -> Atom:
-    """The atom of a token ``(p a ?x)`` or ``p``."""
-    return flat(token) if token.kind == "FLAT" else Atom(name(token), (), of(token))
+    """The atom of a token ``(p a ?x)`` or ``p``. Raises :class:`Misuse` for a bare keyword, which
+    printing would turn into a form."""
+    if token.kind == "FLAT":
+        return flat(token)
+    if token.text.lower() in _HEADS:
+        hint = f"its parts stand with it in parentheses: `({token.text.lower()} …)`"
+        raise Misuse("BBT0101", f"expected a condition or an effect, found `{token.text}`", of(token), hint)
+    return Atom(name(token), (), of(token))
 
 
 def negated(token: Token) -> Atom:
