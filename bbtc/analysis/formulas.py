@@ -164,6 +164,7 @@ def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Cho
                 "BBT0210",
                 f"probability {branch.probability.text} is outside [0, 1]",
                 branch.probability.span,
+                f"if this is a percentage, write {_decimal(value / 100)}" if 2 <= value <= 100 else None,
             )
             faulty = True
         drawn.append((value, effect(names, branch.effect, scope), branch))

@@ -81,7 +81,12 @@ def _check_sections(report: Report, domain: ast.Definition, problem: ast.Definit
         seen: dict[str, ast.Section] = {}
         for section in definition.sections:
             if isinstance(section, ast.Unsupported):
-                report.error("BBT0212", f"{section.construct} is not supported", section.span)
+                report.error(
+                    "BBT0212",
+                    f"`{section.construct}` is not supported",
+                    section.span,
+                    "actions take no time here, and numbers are costs and rewards",
+                )
             elif isinstance(section, wrong) or (
                 isinstance(section, ast.TypedSection) and section.kind == "types" and other == "domain"
             ):
