@@ -35,9 +35,10 @@ def test_a_part_is_of_the_language(kind: str, text: str) -> None:
 
 def test_every_construct_of_the_design_has_an_example() -> None:
     shown = " ".join(text for _, text in EXAMPLES)
-    words = (
+    words = re.findall(
+        r"\S+",
         ":requirements :types either :constants :objects :predicates = not and or imply exists forall when "
         ":derived increase :metric probabilistic :goal-probability oneof :observe unknown known :template "
-        "sequence fallback condition foreach action :goal :init :sensor"
-    ).split()
+        "sequence fallback condition foreach action :goal :init :sensor",
+    )
     assert [word for word in words if f"({word}" not in shown and f" {word} " not in shown] == []
