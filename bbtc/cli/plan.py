@@ -13,7 +13,6 @@ from bbtc.cli.session import (
     Probability,
     Session,
     limit_options,
-    limits_from,
     output_options,
 )
 from bbtc.cli.session import (
@@ -23,7 +22,7 @@ from bbtc.cli.session import (
 if TYPE_CHECKING:
     from bbtc.ground.task import Task
     from bbtc.limits import Limits
-    from bbtc.plan.options import Options
+    from bbtc.plan.options import Options, Retries
     from bbtc.plan.result import Plan, Refinement
     from bbtc.tree.nodes import Status
 
@@ -41,8 +40,15 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option(
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
-@click.option("--strategy", default="refine", show_default=True, help="How to plan.")
+@click.option("--strategy", default="refine", show_default=True, help="How to plan: refine, policy or auto.")
 @click.option("--max-actions", type=click.IntRange(0), metavar="K", help="Let no run take more actions.")
+@click.option(
+    "--retries",
+    type=click.Choice(["least", "unbounded"]),
+    default="least",
+    show_default=True,
+    help="Try again as often as the target takes, or without end (policy, auto).",
+)
 @click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
 @click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
@@ -55,12 +61,10 @@ def command(
     target: Fraction | None,
     strategy: str,
     max_actions: int | None,
+    retries: Retries,
     bounds: bool,
     as_json: bool,
     quiet: bool,
-    time_limit: float | None,
-    max_states: int,
-    max_nodes: int,
     output: str,
     check: bool,
     depfile: str | None,
@@ -80,9 +84,9 @@ def command(
 
     if as_json and not bounds:
         raise click.UsageError("--json goes with --bounds: a tree is always written as JSON.")
-    limits = limits_from(time_limit, max_states, max_nodes)
+    limits = session.limits
     task = load_task(session, files, limits)
-    options = Options(max_actions=max_actions)
+    options = Options(max_actions=max_actions, retries=retries)
     if bounds:
         wanted = task.goal_probability if target is None else target
         return _print_bounds(task, wanted, limits, options, output, as_json=as_json)
@@ -136,7 +140,7 @@ def run_planner(
     if not quiet:
         wanted = task.goal_probability if target is None else target
         session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
-    plan = plan_task(task, target, strategy, limits, tell, options or DEFAULTS)
+    plan = plan_task(task, target, strategy, limits, tell, options=options or DEFAULTS)
     if plan.tree.status == "stuck":
         session.report.warning(
             "BBT0502",

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+Retries: TypeAlias = Literal["least", "unbounded"]
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """``max_actions`` bounds the actions of every run; None: no bound."""
+    """``max_actions`` bounds the actions of every run; None: no bound. ``retries`` tells how often an
+    action may be tried again: as often as it takes to meet the target and no more (without end where
+    no number is enough), or always without end."""
 
     max_actions: int | None = None
+    retries: Retries = "least"
 
 
 DEFAULTS = Options()

@@ -28,10 +28,12 @@ MOST_OPEN = 20_000
 class Offers:
     """A part of a space with local state numbers. State i has the offers ``first[i]:first[i + 1]``,
     each an action (``action``) and the states it may lead to (``target`` from ``edge_first``).
-    States without offers end a run: in the goal (``goal``), or because the goal is out of reach."""
+    States without offers end a run: in the goal (``goal``), because the goal is out of reach, or
+    because nothing can start there for want of attempts (``idle``)."""
 
     values: npt.NDArray[np.uint8]
     goal: Flags
+    idle: Flags
     first: Index
     action: Index
     edge_first: Index
@@ -81,10 +83,15 @@ def _fewest_actions(found: Reachability, limits: Limits) -> tuple[Index, Flags]:
     return found.policy, only
 
 
-def offers_of(space: StateSpace, taken: Flags) -> Offers:
-    """The part of a space that a run may visit if it takes only choices of ``taken``."""
+def offers_of(
+    space: StateSpace, taken: Flags, entry: Index | None = None, inside: Flags | None = None
+) -> Offers:
+    """The part of a space that a run may visit if it takes only choices of ``taken``, from the initial
+    states or from ``entry``; where ``inside`` is given, nothing starts outside of it."""
     number = np.full(len(space.states), -1, dtype=np.int64)
-    initial = np.unique([state for _, state in space.initial])
+    initial = np.unique([state for _, state in space.initial]) if entry is None else entry
+    if inside is not None:
+        taken = taken & np.repeat(inside, np.diff(space.choice_first))
     found: list[Index] = []
     frontier: Index = initial.astype(np.int64)
     count = 0
@@ -104,6 +111,7 @@ def offers_of(space: StateSpace, taken: Flags) -> Offers:
     return Offers(
         values=space.packing.unpack(space.states[states]),
         goal=space.goal[states],
+        idle=np.zeros(len(states), dtype=np.bool_) if inside is None else ~inside[states],
         first=np.concatenate(([0], np.cumsum(owner_counts))),
         action=space.choice_action[choices].astype(np.int64),
         edge_first=np.concatenate(([0], np.cumsum(edge_counts))),

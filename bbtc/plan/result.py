@@ -12,6 +12,7 @@ from bbtc.diagnostics import Diagnostic
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.plan.options import Options
 from bbtc.tree.nodes import Tree
 
 
@@ -58,6 +59,8 @@ class Plan:
 class Strategy(Protocol):
     """A planner: from a ground task and a target probability to a plan. Always returns."""
 
-    def __call__(self, task: Task, target: Fraction, limits: Limits, progress: Progress) -> Plan:
+    def __call__(
+        self, task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = ...
+    ) -> Plan:
         """Plan. ``progress`` is told every refinement as it is made."""
         ...

@@ -21,23 +21,23 @@ STRATEGIES = {
 DEFAULT = "refine"
 
 
-def load_strategy(name: str) -> Strategy:
-    """The strategy of a name. Raises :class:`BbtcError` for an unknown one."""
+def run_strategy(
+    name: str, task: Task, target: Fraction, *, limits: Limits, progress: Progress, options: Options
+) -> Plan:
+    """Plan with a strategy. Raises :class:`BbtcError` for an unknown one, and for options that it
+    does not know."""
     if name not in STRATEGIES:
         raise BbtcError.single(
             "BBT0501", f"unknown strategy '{name}'", hint=f"known: {', '.join(STRATEGIES)}"
         )
     module, function = STRATEGIES[name]
     strategy: Strategy = getattr(import_module(module), function)
-    return strategy
-
-
-def run_strategy(
-    name: str, task: Task, target: Fraction, *, limits: Limits, progress: Progress, options: Options
-) -> Plan:
-    """Plan with a strategy. Raises :class:`BbtcError` for an unknown one, and for options that it
-    does not know."""
-    strategy = load_strategy(name)
-    if options.max_actions is not None:
-        raise BbtcError.single("BBT0503", f"the strategy '{name}' does not plan within a number of actions")
-    return strategy(task, target, limits, progress)
+    if name == "refine":
+        if options.max_actions is not None:
+            raise BbtcError.single(
+                "BBT0503",
+                f"the strategy '{name}' does not plan within a number of actions",
+                hint="use --strategy policy",
+            )
+        return strategy(task, target, limits, progress)
+    return strategy(task, target, limits, progress, options)

@@ -105,7 +105,7 @@ class Learner:
             waiting = np.flatnonzero(relevant & group & active & ~decided)
             if not len(waiting):
                 return rules
-            against = np.flatnonzero(relevant & ~decided & ((group & ~active) | avoid))
+            against = np.flatnonzero(relevant & ~decided & ((group & ~active & ~self.offers.idle) | avoid))
             tests, action, covered = self._best_rule(waiting, against)
             rules.append(Rule(tests, action, np.concatenate([waiting, against])))
             decided[covered] = True

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.ground.condition import Condition, compile_condition, conjuncts
+from bbtc.ground.condition import FALSE, Condition, compile_condition, conjuncts
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -28,6 +28,22 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode,
 def synthesize(task: Task, offers: Offers, limits: Limits) -> Node:
     """A tree that takes one of the offers in every state a run visits, and otherwise fails.
     Raises ``LimitReached`` when the time is over."""
+    return numbered(_tree(task, offers, limits, fall_through=False))
+
+
+def in_phases(task: Task, phases: Sequence[tuple[int, Offers]], limits: Limits) -> Node:
+    """Trees for offers that follow one another, each after so many actions of the one before.
+    Raises ``LimitReached`` when the time is over."""
+    parts: list[Node] = []
+    for number, (steps, offers) in enumerate(phases, 1):
+        tree = _tree(task, offers, limits, fall_through=number < len(phases))
+        parts.append(ControlNode("", "retry", (tree,), attempts=steps))
+    return numbered(_control("fallback", parts) if parts else ConditionNode("", task.goal))
+
+
+def _tree(task: Task, offers: Offers, limits: Limits, *, fall_through: bool) -> Node:
+    """``fall_through``: fail where the goal is unknown and nothing is done about it, so that what
+    follows gets its turn."""
     goal = _truths(task.goal, offers.values)
     unknown: Flags = goal == Truth.UNKNOWN
     false: Flags = goal == Truth.FALSE
@@ -40,8 +56,10 @@ def synthesize(task: Task, offers: Offers, limits: Limits) -> Node:
     build = _Builder(task, offers.values)
     if watching:
         node = _control("skipper", [node, build.choice(build.rules(watching))])
+    elif fall_through and (unknown & learner.relevant()).any():
+        node = _control("skipper", [node, ConditionNode("", FALSE)])
     children = build.rules(acting)
-    return numbered(_control("fallback", [node, *children]) if children else node)
+    return _control("fallback", [node, *children]) if children else node
 
 
 def numbered(root: Node) -> Node:

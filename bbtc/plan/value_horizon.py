@@ -107,3 +107,23 @@ def best_choices(horizon: Horizon, graph: Graph, step: int) -> Flags:
     attained = sums(graph.edge_choice, weight * floats[space.edge_target], graph.choices)
     best: Flags = attained >= np.asarray(horizon.values[step])[graph.choice_state] - 1e-12
     return best
+
+
+def cheapest_choices(horizon: Horizon, graph: Graph, best: list[Flags]) -> list[Flags]:
+    """Of the best choices with 1, 2, … actions left, those of the least expected cost (as far as
+    floats tell: cost only breaks ties)."""
+    space = horizon.space
+    weight = draw_probabilities(space)
+    table = np.array([float(draw.cost) for draw in space.draws] or [0.0])
+    own = sums(graph.edge_choice, weight * table[space.edge_draw], graph.choices)
+    cost = np.zeros(graph.states)
+    found: list[Flags] = []
+    for step, attained in enumerate(best, 1):
+        hopeless = np.asarray(horizon.values[step], dtype=np.float64) == 0
+        usable = attained & ~hopeless[graph.choice_state]
+        total = own + sums(graph.edge_choice, weight * cost[space.edge_target], graph.choices)
+        least = np.full(graph.states, np.inf)
+        np.minimum.at(least, graph.choice_state[usable], total[usable])
+        found.append(usable & (total <= least[graph.choice_state] + 1e-9))
+        cost = np.where(np.isinf(least), 0.0, least)
+    return found

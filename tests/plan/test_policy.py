@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from fractions import Fraction
 
 import pytest
 from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
 from bbtc.belief.simulate import simulate
@@ -17,11 +19,14 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
+from bbtc.plan.options import DEFAULTS, Options
+from bbtc.plan.policy_retry import longest_run
 from bbtc.plan.result import Plan
 from bbtc.plan.space import explore_space
 from bbtc.plan.value import reachability
 from bbtc.plan.value_cost import least_cost
-from bbtc.tree.nodes import ActionNode, walk
+from bbtc.plan.value_horizon import horizon_values
+from bbtc.tree.nodes import ActionNode, ControlNode, Node, retries_of, walk
 from bbtc.tree.validate import check_tree
 from tests.plan.examples import Optimum, cases, corpus_optima
 from tests.plan.test_refine import action, task
@@ -30,9 +35,14 @@ from tests.strategies import tasks
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 
 
-def plan(of: Task, target: str | None = None, limits: Limits | None = None) -> Plan:
+UNBOUNDED = Options(retries="unbounded")
+
+
+def plan(
+    of: Task, target: str | None = None, limits: Limits | None = None, options: Options = UNBOUNDED
+) -> Plan:
     wanted = None if target is None else Fraction(target)
-    return plan_task(of, wanted, "policy", limits or Limits(), lambda _: None)
+    return plan_task(of, wanted, "policy", limits or Limits(), lambda _: None, options)
 
 
 def size(of: Plan) -> int:
@@ -79,9 +89,95 @@ def test_random_tasks_are_solved_at_their_best_and_least_cost(of: Task) -> None:
         assert done.figures.cost == cheapest.initial
 
 
-def test_actions_that_cost_nothing_do_not_run_in_circles() -> None:
-    import dataclasses
+# --- within a number of actions ----------------------------------------------------------------
 
+
+@pytest.mark.parametrize("case", cases(), ids=lambda c: c.name)
+def test_cases_are_solved_at_their_best_within_every_budget(case: Optimum) -> None:
+    of = case.task()
+    for budget, expected in case.within:
+        done = plan(of, "1", options=Options(max_actions=budget))
+        assert float(done.tree.success_probability) == pytest.approx(expected, abs=6e-7)
+        assert done.tree.bounds == (done.tree.success_probability, done.tree.success_probability)
+        longest = longest_run(explore(of, done.tree.root, Limits()))
+        assert longest is not None
+        assert longest <= budget
+        assert size(done) <= 11
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks(), budget=st.integers(0, 6))
+def test_random_tasks_are_solved_at_their_best_within_a_budget(of: Task, budget: int) -> None:
+    done = plan(of, "1", options=Options(max_actions=budget))
+    chain = explore(of, done.tree.root, Limits())
+    check_tree(done.tree)
+    assert violations(of, chain) == []
+    expected = horizon_values(explore_space(of, Limits(), budget), budget, Limits()).initial[budget].exact
+    assert done.tree.success_probability == expected
+    longest = longest_run(chain)
+    assert longest is not None
+    assert longest <= budget
+
+
+def test_the_best_choice_may_change_as_the_budget_runs_out() -> None:
+    """A slow sure way takes three steps and ends where it began if it is broken off; a risky one
+    takes one. With four steps left one can still try the risky way once and then take the slow."""
+    risky = action("risky", conjunction([Is(1, F), Is(2, F)]), ("1/2", {0: T}), ("1/2", {}))
+    first = action("slow-1", conjunction([Is(1, F), Is(2, F)]), ("1", {1: T}))
+    second = action("slow-2", Is(1, T), ("1", {1: F, 2: T}))
+    third = action("slow-3", Is(2, T), ("9/10", {0: T}), ("1/10", {2: F}))
+    of = task("won first second", {}, Is(0, T), risky, first, second, third)
+    for budget in range(1, 8):
+        done = plan(of, "1", options=Options(max_actions=budget))
+        expected = horizon_values(explore_space(of, Limits()), budget, Limits()).initial[budget].exact
+        assert done.tree.success_probability == expected
+
+
+# --- how often to try again --------------------------------------------------------------------
+
+
+def test_an_action_is_tried_as_often_as_the_target_takes() -> None:
+    again = action("again", Is(0, F), ("1/2", {0: T}), ("1/2", {}))
+    of = task("a", {}, Is(0, T), again)
+    done = plan(of, "0.9", options=DEFAULTS)
+    assert [attempts for _, attempts in retries_of(done.tree.root)] == [4]
+    assert done.tree.success_probability == 1 - Fraction(1, 2) ** 4
+    assert list(retries_of(plan(of, "0.9", options=UNBOUNDED).tree.root)) == []
+
+
+def test_where_no_number_of_tries_is_enough_there_is_no_bound() -> None:
+    again = action("again", Is(0, F), ("1/2", {0: T}), ("1/2", {}))
+    done = plan(task("a", {}, Is(0, T), again), "1", options=DEFAULTS)
+    assert (done.tree.status, done.tree.success_probability) == ("target-reached", 1)
+    assert list(retries_of(done.tree.root)) == []
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks(), target=st.sampled_from(["1/3", "0.9", "0.999"]))
+def test_one_attempt_less_would_miss_the_target(of: Task, target: str) -> None:
+    done = plan(of, target, options=DEFAULTS)
+    best = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    assert best is not None
+    assert done.tree.success_probability <= best
+    assert (done.tree.status == "target-reached") == (best >= Fraction(target))
+    for node, attempts in retries_of(done.tree.root):
+        if attempts > 1:
+            fewer = _with_attempts(done.tree.root, node.id, attempts - 1)
+            assert simulate(of, fewer, Limits()).success < Fraction(target)
+
+
+def _with_attempts(node: Node, place: str, attempts: int) -> Node:
+    if not isinstance(node, ControlNode):
+        return node
+    children = tuple(_with_attempts(child, place, attempts) for child in node.children)
+    bound = attempts if node.id == place else node.attempts
+    return dataclasses.replace(node, children=children, attempts=bound)
+
+
+# --- by hand -----------------------------------------------------------------------------------
+
+
+def test_actions_that_cost_nothing_do_not_run_in_circles() -> None:
     there, back = action("a-there", Is(0, F), ("1", {0: T})), action("b-back", Is(0, T), ("1", {0: F}))
     win = action("c-win", Is(0, T), ("1", {1: T}))
     free = [dataclasses.replace(a, cost=Fraction(0)) for a in (there, back, win)]
