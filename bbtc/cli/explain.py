@@ -29,7 +29,10 @@ def _code(text: str) -> str:
     code = f"BBT{digits[1]:>04}" if digits else text.upper()
     if code in CODES:
         return code
-    near = difflib.get_close_matches(code[:20], CODES, 3, 0.7)
+    if digits:
+        near = sorted(CODES, key=lambda each: abs(int(each[3:]) - int(digits[1])))[:3]
+    else:
+        near = difflib.get_close_matches(code[:20], CODES, 3, 0.7)
     hint = f" Near ones: {', '.join(near)}." if near else ""
     raise click.UsageError(f"There is no code '{text[:40]}'.{hint} `bbtc explain` lists all.")
 

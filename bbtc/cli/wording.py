@@ -35,8 +35,7 @@ def refinement_line(number: int, step: Refinement) -> list[str]:
     if step.kind == "retreat":
         taken = counted(step.taken_back, "refinement")
         return [
-            f"{number:3d}. no progress: take back {taken}, and do not insert {step.inserted} for "
-            f"{step.condition} again",
+            f"{number:3d}. no progress: take back {taken} and never again insert {step.inserted} here",
             f"     success {exact(step.success)}, {step.nodes} nodes",
         ]
     if step.kind == "move":
