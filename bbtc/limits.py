@@ -13,7 +13,8 @@ class Limits:
     """Bounds for one run; ``None`` means no bound.
 
     ``seconds`` counts from the moment the object is made. ``states`` bounds the physical states
-    of one simulation, ``nodes`` the nodes of a tree. Of grounding, ``actions`` bounds the ground
+    of one simulation, ``nodes`` the nodes of a tree. Of reading, ``file_bytes`` bounds the size of
+    a file, and ``depth`` how deep its parentheses are nested. Of grounding, ``actions`` bounds the ground
     actions and templates, ``facts`` everything that the reachability analysis derives,
     ``bindings`` the objects that quantifiers are tried with,
     ``memory`` the bytes its engine may take, ``initial_states`` what a draw in ``:init`` is spelled
@@ -28,6 +29,8 @@ class Limits:
     bindings: int = 100_000_000
     memory: int | None = 4 << 30
     initial_states: int = 256
+    file_bytes: int = 64 << 20
+    depth: int = 100
     _start: float = field(default_factory=time.monotonic, compare=False, repr=False)
 
     @property

@@ -32,11 +32,14 @@ class Inputs:
     problem: Definition | None
 
 
-def parse_all(sources: Sequence[SourceFile], report: Report) -> tuple[Document, ...]:
+def parse_all(
+    sources: Sequence[SourceFile], report: Report, limits: Limits | None = None
+) -> tuple[Document, ...]:
     """The syntax tree of every file; syntax errors of all of them go to the report."""
     from bbtc.syntax.parser import parse
 
-    return tuple(parse(source, report) for source in sources)
+    depth = (limits or Limits()).depth
+    return tuple(parse(source, report, depth) for source in sources)
 
 
 def select(documents: Sequence[Document], report: Report) -> Inputs | None:
@@ -87,7 +90,7 @@ def compile_sources(
 
     Raises :class:`BbtcError` with every error found, or :class:`bbtc.diagnostics.LimitReached`.
     """
-    documents = parse_all(sources, report)
+    documents = parse_all(sources, report, limits)
     report.raise_errors()
     inputs = select(documents, report)
     report.raise_errors()
@@ -113,6 +116,7 @@ def plan_task(
     strategy: str,
     limits: Limits,
     progress: Progress,
+    *,
     options: Options = DEFAULTS,
 ) -> Plan:
     """Plan a tree; ``target`` None stands for the task's own goal probability. Where the tree falls

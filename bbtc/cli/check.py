@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import click
 
-from bbtc.cli.session import Session
+from bbtc.cli.session import Session, reading_limits
 from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
 from bbtc.diagnostics import Diagnostic, Report, Severity
@@ -46,6 +46,7 @@ class CodePrefixes(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     help="Do not show the warnings and notes with these codes. The longer of two prefixes decides.",
 )
 @click.option("--strict", is_flag=True, help="Fail if there are warnings.")
+@reading_limits
 @session_command
 def command(
     session: Session,
@@ -67,7 +68,7 @@ def command(
 
     report = Report()
     try:
-        documents = parse_all([session.read(file) for file in files], report)
+        documents = parse_all([session.read(file) for file in files], report, session.limits)
         if not report.errors:
             _check(documents, report)
     finally:

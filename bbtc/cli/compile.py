@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from bbtc.cli.output import write, write_depfile
-from bbtc.cli.session import Session, output_options, time_limit_option
+from bbtc.cli.session import Session, grounding_limits, output_options
 from bbtc.cli.session import command as session_command
 
 
@@ -18,33 +18,30 @@ from bbtc.cli.session import command as session_command
     show_default=True,
     help="Which stage to write: the syntax trees, the resolved model, or the ground task.",
 )
-@time_limit_option
+@grounding_limits
 @output_options
 @session_command
 def command(
     session: Session,
     files: tuple[str, ...],
     emit: str,
-    time_limit: float | None,
     output: str,
     check: bool,
     depfile: str | None,
 ) -> None:
     """Parse, check and ground the PROBLEM of DOMAIN, and write the task as JSON."""
     from bbtc import artefacts, pipeline
-    from bbtc.limits import Limits
 
     sources = [session.read(file) for file in files]
     if emit == "ground":
-        limits = Limits(seconds=time_limit)
-        task = pipeline.compile_sources(sources, session.report, limits, checks=True)
+        task = pipeline.compile_sources(sources, session.report, session.limits, checks=True)
         text = artefacts.dumps(artefacts.task_to_json(task))
         session.say(
             f"{task.domain}/{task.problem}: {len(task.variables)} variables, {len(task.actions)} actions, "
             f"{len(task.templates)} templates"
         )
     else:
-        documents = pipeline.parse_all(sources, session.report)
+        documents = pipeline.parse_all(sources, session.report, session.limits)
         session.report.raise_errors()
         if emit == "ast":
             text = artefacts.dumps(artefacts.syntax_to_json(documents))

@@ -11,7 +11,6 @@ from bbtc.cli.session import (
     Probability,
     Session,
     limit_options,
-    limits_from,
     output_options,
 )
 from bbtc.cli.session import (
@@ -60,9 +59,6 @@ def command(
     options: tuple[str, ...],
     target: Fraction | None,
     strategy: str,
-    time_limit: float | None,
-    max_states: int,
-    max_nodes: int,
     output: str,
     check: bool,
     depfile: str | None,
@@ -74,7 +70,7 @@ def command(
     from bbtc.pipeline import export_tree
 
     load_exporter(form)  # an unknown format is reported before any work
-    limits = limits_from(time_limit, max_states, max_nodes)
+    limits = session.limits
     sources = [session.read(file) for file in files]
     status = 0
     if len(sources) == 1 and is_artefact(sources[0]) and is_tree(sources[0]):

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, NoReturn, cast
+from typing import Any, NoReturn, TypeAlias, cast
 
 import click
 
@@ -26,6 +26,7 @@ class Session:
     """One run of a command: its diagnostics and where its messages go."""
 
     form: str
+    limits: Limits
     report: Report = field(default_factory=Report)
     inputs: list[str] = field(default_factory=list)
 
@@ -39,7 +40,7 @@ class Session:
         from bbtc.syntax.reader import read_source
 
         self.inputs.append(path)
-        return read_source(path)
+        return read_source(path, self.limits.file_bytes)
 
     def show(self, diagnostics: Sequence[Diagnostic]) -> None:
         """Write diagnostics to stderr in the session's form (the machine forms even if empty)."""
@@ -62,7 +63,9 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
 
     @functools.wraps(function)
     def run(ctx: click.Context, own_format: str | None, **arguments: Any) -> None:
-        session = Session(own_format or ctx.obj["format"])
+        bounds = {key: arguments.pop(key) for key in list(arguments) if key.startswith("limit_")}
+        limits = Limits(**{key.removeprefix("limit_"): value for key, value in bounds.items()})
+        session = Session(own_format or ctx.obj["format"], limits)
         try:
             status = function(session, **arguments)
         except BbtcError as error:
@@ -110,28 +113,58 @@ def output_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-time_limit_option = click.option(
-    "--time-limit", type=click.FloatRange(0, min_open=True), metavar="SECONDS", help="Wall-clock time."
+_MIB = 1 << 20
+# Option, field of Limits, smallest and largest value, unit (1: as it is), help.
+_READING = (
+    ("--max-file-size", "file_bytes", 1, None, _MIB, "MiB of an input file."),
+    ("--max-depth", "depth", 1, 900, 1, "Nested parentheses."),
 )
+_GROUNDING = (
+    ("--max-ground-actions", "actions", 1, None, 1, "Ground actions and templates."),
+    ("--max-facts", "facts", 1, None, 1, "Facts derived in grounding."),
+    ("--max-bindings", "bindings", 1, None, 1, "Objects that quantifiers are tried with."),
+    ("--max-memory", "memory", 1, None, _MIB, "MiB of memory for grounding."),
+)
+_RUNNING = (
+    ("--max-states", "states", 1, None, 1, "States of a simulation."),
+    ("--max-nodes", "nodes", 1, None, 1, "Nodes of a tree."),
+)
+_Table: TypeAlias = tuple[tuple[str, str, int, int | None, int, str], ...]
 
 
-def limit_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """``--time-limit``, ``--max-states`` and ``--max-nodes``; see :func:`limits_from`."""
-    defaults = Limits()
-    at_least_one = click.IntRange(1)
-    for option in (
-        click.option(
-            "--max-nodes", type=at_least_one, default=defaults.nodes, show_default=True, help="Tree nodes."
-        ),
-        click.option(
-            "--max-states", type=at_least_one, default=defaults.states, show_default=True, help="States."
-        ),
-        time_limit_option,
-    ):
-        function = option(function)
-    return function
+def _limits(*tables: _Table, timed: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    rows = [row for table in tables for row in table]
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        for option, field_name, least, most, unit, told in reversed(rows):
+            default = getattr(Limits(), field_name) // unit
+            function = click.option(
+                option,
+                f"limit_{field_name}",
+                type=click.IntRange(least, most),
+                default=default,
+                show_default=True,
+                help=told,
+                callback=lambda _context, _parameter, value, unit=unit: value * unit,
+            )(function)
+        if timed:
+            function = click.option(
+                "--time-limit",
+                "limit_seconds",
+                type=click.FloatRange(0, min_open=True),
+                metavar="SECONDS",
+                help="Wall-clock time.",
+            )(function)
+        return function
+
+    return decorate
 
 
-def limits_from(time_limit: float | None, max_states: int, max_nodes: int) -> Limits:
-    """The limits that the options of :func:`limit_options` ask for, from now on."""
-    return Limits(seconds=time_limit, states=max_states, nodes=max_nodes)
+reading_limits = _limits(_READING, timed=False)
+"""Options for a command that only reads; the values are in :attr:`Session.limits`."""
+
+grounding_limits = _limits(_READING, _GROUNDING, timed=True)
+"""Options for a command that reads and grounds."""
+
+limit_options = _limits(_READING, _GROUNDING, _RUNNING, timed=True)
+"""Options for a command that reads, grounds, plans and simulates."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bbtc.cli.output import write
-from bbtc.cli.session import Session, limit_options, limits_from
+from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
 
 if TYPE_CHECKING:
@@ -35,9 +35,6 @@ def command(
     seed: int,
     as_json: bool,
     output: str,
-    time_limit: float | None,
-    max_states: int,
-    max_nodes: int,
 ) -> None:
     """Print the exact figures of TREE: how probably it succeeds, why it fails, what it costs."""
     from bbtc import artefacts
@@ -48,7 +45,7 @@ def command(
     from bbtc.pipeline import simulate_tree
 
     loaded = tree_of(session.read(tree))
-    limits = limits_from(time_limit, max_states, max_nodes)
+    limits = session.limits
     figures, chain = simulate_tree(loaded, limits)
     listed = list(itertools.islice(runs(chain), scenarios))
     sampled = sample(chain, samples, seed) if samples else None

@@ -64,7 +64,7 @@ def plan_summary(plan: Plan) -> list[str]:
         case "stuck":
             return [f"target {wanted} not reached: nothing is left to insert; the best tree has {reached}"]
         case "limit-reached":
-            stop = plan.stop.message if plan.stop is not None else "a limit was reached"
+            stop = f"{plan.stop.message} ({plan.stop.hint})" if plan.stop is not None else "a limit"
             return [f"target {wanted} not reached: {stop}; the best tree so far has {reached}"]
         case "interrupted":
             return [f"interrupted; the best tree so far has {reached}"]

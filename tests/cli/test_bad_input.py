@@ -82,12 +82,6 @@ EDITS = {
     "sum above 1": ("0.5 (not (seen", "0.6 (not (seen", "", ["1.1"]),
     "goal probability": ("(:goal-probability 0.9)", "(:goal-probability 1.5)", "1.5", ["1.5"]),
     "unknown call": ("(goto ?place)\n", "(gotto ?place)\n", "gotto", ["gotto", "goto"]),
-    "duplicate action": (
-        "(:action light_on",
-        "(:action detect\n    :effect (luminousity_ok))\n  (:action light_on",
-        "",
-        [],
-    ),
     "unsupported": (
         "(:action light_on",
         "(:durative-action boil)\n  (:action light_on",
@@ -270,3 +264,19 @@ def test_diagnostics_for_machines(folder: Path, form: str) -> None:
 def test_an_output_that_cannot_be_written_is_an_error(folder: Path) -> None:
     done = bbtc("compile", "domain.pddl", "problem.pddl", "-o", "missing/task.json", folder=folder)
     assert_refused(done, folder, "missing/task.json")
+
+
+@pytest.mark.parametrize(
+    ("switch", "value", "status", "told"),
+    [
+        ("--max-depth", "3", 1, "nested more than 3 deep"),
+        ("--max-ground-actions", "1", 3, "raise it with --max-ground-actions"),
+        ("--max-states", "1", 3, "raise it with --max-states"),
+        ("--time-limit", "1e-9", 3, "raise it with --time-limit"),
+    ],
+)
+def test_every_limit_has_its_switch(folder: Path, switch: str, value: str, status: int, told: str) -> None:
+    done = bbtc("plan", "domain.pddl", "problem.pddl", switch, value, folder=folder)
+    assert done.returncode == status, done.stderr
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr

@@ -127,4 +127,4 @@ def test_json_needs_bounds(oneshot: str) -> None:
 
 def test_refine_does_not_plan_within_a_number_of_actions() -> None:
     with pytest.raises(BbtcError, match="number of actions"):
-        plan_task(one_shot(), None, "refine", Limits(), lambda _: None, Options(max_actions=2))
+        plan_task(one_shot(), None, "refine", Limits(), lambda _: None, options=Options(max_actions=2))

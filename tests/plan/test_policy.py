@@ -42,7 +42,7 @@ def plan(
     of: Task, target: str | None = None, limits: Limits | None = None, options: Options = UNBOUNDED
 ) -> Plan:
     wanted = None if target is None else Fraction(target)
-    return plan_task(of, wanted, "policy", limits or Limits(), lambda _: None, options)
+    return plan_task(of, wanted, "policy", limits or Limits(), lambda _: None, options=options)
 
 
 def size(of: Plan) -> int:
