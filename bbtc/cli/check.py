@@ -9,7 +9,7 @@ import click
 from bbtc.cli.session import Session, reading_limits
 from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
-from bbtc.diagnostics import Diagnostic, Report, Severity
+from bbtc.diagnostics import Diagnostic, Related, Report, Severity
 from bbtc.syntax.ast import Definition, Document
 
 
@@ -59,8 +59,9 @@ def command(
     that nothing makes true or known.
 
     Every problem is checked with the domain of its name among FILES; a problem without its domain
-    is checked for syntax only. What rests on the problem, such as an action that it never needs, is
-    a note; with several problems it is reported only if it holds for all of them, as a warning.
+    is checked for syntax only, and a note says so. What rests on the problem, such as an action
+    that it never needs, is a note; with several problems it is reported only if it holds for all of
+    them, as a warning.
     Errors are always shown. `bbtc explain CODE` tells more about a code.
     """
     from bbtc.cli.wording import counted
@@ -104,20 +105,33 @@ def _check(documents: Iterable[Document], report: Report) -> None:
 
     definitions = [definition for document in documents for definition in document.definitions]
     domains: dict[str, Definition] = {}
-    for definition in definitions:
-        if definition.kind == "domain":
-            domains.setdefault(definition.name.key, definition)
-    problems: dict[str, list[Definition | None]] = {key: [] for key in domains}
-    for definition in definitions:
-        domain = _domain_of(definition, domains) if definition.kind == "problem" else None
-        if domain is not None:
-            problems[domain.name.key].append(definition)
-    for key, domain in domains.items():
+    problems: list[tuple[Definition, list[Definition | None]]] = []
+    for domain in (definition for definition in definitions if definition.kind == "domain"):
+        problems.append((domain, []))
+        first = domains.setdefault(domain.name.key, domain)
+        if first is not domain:
+            report.warning(
+                "BBT0208",
+                f"domain `{domain.name.text}` is defined twice",
+                domain.name.span,
+                "problems are checked with the first one",
+                [Related("the first one", first.name.span)],
+            )
+    for problem in (definition for definition in definitions if definition.kind == "problem"):
+        home = _domain_of(problem, domains)
+        if home is None:
+            message = f"the domain of problem `{problem.name.text}` is not among the files"
+            hint = "give its file, too: without it, only the syntax is checked"
+            report.add(Diagnostic("BBT0006", message, problem.name.span, hint, Severity.NOTE))
+        for domain, its_problems in problems:
+            if domain is home:
+                its_problems.append(problem)
+    for domain, its_problems in problems:
         models = []
-        for problem in problems[key] or [None]:
+        for each in its_problems or [None]:
             # A report of its own: the errors of one problem do not hide the checks of the next.
             own = Report()
-            model = resolve(domain, problem, own)
+            model = resolve(domain, each, own)
             models.extend([] if model is None else [model])
             for diagnostic in own:
                 report.add(diagnostic)

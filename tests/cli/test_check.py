@@ -123,3 +123,20 @@ def test_other_commands_show_warnings_but_no_notes(folder: Path, command: str) -
     status, messages = bbtc(command, "domain.pddl", "a.pddl", "-o", "out.json", folder=folder)
     assert status == 0
     assert findings(messages) == {UNUSED}
+
+
+def test_a_problem_without_its_domain_is_noted(folder: Path) -> None:
+    status, messages = bbtc("check", "a.pddl", folder=folder)
+    assert status == 0
+    assert findings(messages) == {("note", "BBT0006", "pa")}
+
+
+def test_two_domains_of_one_name_are_both_checked(folder: Path) -> None:
+    (folder / "other.pddl").write_text(DOMAIN.replace("(unused)", "(idle)"))
+    status, messages = bbtc(
+        "check", "domain.pddl", "other.pddl", "a.pddl", "--select", "BBT02", folder=folder
+    )
+    assert status == 0
+    assert findings(messages) == {("warning", "BBT0208", "d")}
+    _, messages = bbtc("check", "domain.pddl", "other.pddl", "a.pddl", folder=folder)
+    assert {UNUSED, ("warning", "BBT0301", "idle")} <= findings(messages)
