@@ -163,25 +163,29 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Corpus:
-    """The tables of a corpus."""
+    """The tables of a corpus; ``both`` are the files that hold a domain and a problem."""
 
     folder: Path
     families: dict[str, list[str]]
     partners: dict[str, list[str]]
     odd: dict[str, str]
+    both: frozenset[str]
 
 
 def read_corpus(folder: Path) -> Corpus:
     """The tables of the corpus in a folder."""
+    both: set[str] = set()
     families: dict[str, list[str]] = defaultdict(list)
     partners: dict[str, list[str]] = defaultdict(list)
     for row in _rows(folder / "INDEX.tsv"):
         families[row["family"]].append(row["path"])
+        if row["kind"] == "both":
+            both.add(row["path"])
     for row in _rows(folder / "PAIRS.tsv"):
         if row["domain"] not in {"-", row["problem"]}:
             partners[row["problem"]].append(row["domain"])
     odd = {row["path"]: row["odd"] for row in _rows(folder / "ODDITIES.tsv")}
-    return Corpus(folder, dict(families), dict(partners), odd)
+    return Corpus(folder, dict(families), dict(partners), odd, frozenset(both))
 
 
 def _rows(file: Path) -> Iterable[dict[str, str]]:

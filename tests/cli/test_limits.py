@@ -1,0 +1,98 @@
+"""Input made to exhaust the machine ends soon, within bounded memory, with a message and a status."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import REPOSITORY
+
+_MEMORY = 6 << 30  # bytes of address space; more than that ends the process
+_SECONDS = 60.0  # processor time
+
+_ENOUGH = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({_MEMORY}, {_MEMORY}))\n"
+_MAIN = f"{_ENOUGH}from bbtc.cli.main import main; main()"
+
+
+def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the program; fails if it takes too much processor time."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    started = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-c", _MAIN, *arguments],
+        capture_output=True, text=True, check=False, timeout=600, cwd=REPOSITORY,
+    )  # fmt: skip
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    assert used < _SECONDS, f"{used:.1f} s of processor time, {time.monotonic() - started:.1f} s in all"
+    assert "Traceback" not in done.stderr
+    assert "internal error" not in done.stderr
+    return done
+
+
+def _wide(path: Path, parameters: int, objects: int, condition: str) -> Path:
+    names = [f"?x{n}" for n in range(parameters)]
+    path.write_text(
+        f"""(define (domain wide)
+          (:predicates (p ?x) (q ?x ?y) (done))
+          (:action all :parameters ({" ".join(names)})
+            :precondition {condition.format(" ".join(f"(p {name})" for name in names))}
+            :effect (done)))
+        (define (problem many) (:domain wide)
+          (:objects {" ".join(f"o{n}" for n in range(objects))})
+          (:init {" ".join(f"(p o{n})" for n in range(objects))})
+          (:goal (done)))"""
+    )
+    return path
+
+
+@pytest.mark.parametrize("text", ["(", ")", "()"])
+def test_200_megabytes_of_parentheses(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "parentheses.pddl"
+    with file.open("w") as out:
+        for _ in range(200):
+            out.write(text * (1_000_000 // len(text)))
+    done = _run("check", str(file))
+    assert done.returncode == 1
+    assert "BBT0005" in done.stderr
+    assert "larger than" in done.stderr
+
+
+def test_as_many_parentheses_as_a_file_may_hold(tmp_path: Path) -> None:
+    file = tmp_path / "parentheses.pddl"
+    file.write_text("(" * 60_000_000)
+    done = _run("check", str(file))
+    assert done.returncode == 1
+    assert "BBT0005" in done.stderr
+    assert "nested" in done.stderr
+
+
+def test_a_hundred_thousand_nested_conjunctions(tmp_path: Path) -> None:
+    file = tmp_path / "nested.pddl"
+    nested = "(and " * 100_000 + "(p)" + ")" * 100_000
+    file.write_text(
+        f"(define (domain d) (:predicates (p)) (:action a :precondition {nested} :effect (not (p))))"
+    )
+    done = _run("check", str(file))
+    assert done.returncode == 1
+    assert "nested.pddl:1:" in done.stderr
+    assert "BBT0005" in done.stderr
+
+
+@pytest.mark.parametrize("condition", ["(and {})", "(and)", "(not (and {}))", "(or {})"])
+def test_twelve_parameters_over_a_thousand_objects(tmp_path: Path, condition: str) -> None:
+    file = _wide(tmp_path / "wide.pddl", 12, 1000, condition)
+    done = _run("compile", str(file), "--time-limit", "5", "-o", str(tmp_path / "task.json"))
+    assert done.returncode == 3
+    assert "BBT0007" in done.stderr
+
+
+def test_twelve_parameters_that_few_objects_fit(tmp_path: Path) -> None:
+    file = _wide(tmp_path / "wide.pddl", 12, 1, "(and {})")
+    done = _run("compile", str(file), "-o", str(tmp_path / "task.json"))
+    assert done.returncode == 0

@@ -1,0 +1,65 @@
+"""Ground actions of public STRIPS problems are those that Fast Downward finds."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from bbtc.diagnostics import Report
+from bbtc.ground.instantiate import instantiate
+from bbtc.limits import Limits
+from bbtc.pipeline import parse_all, resolve_model, select
+from bbtc.syntax.reader import read_source
+from tests import downward
+from tests.conftest import corpus_folder
+from tests.corpus import read_corpus
+
+CORPUS = corpus_folder()
+pytestmark = [
+    pytest.mark.skipif(CORPUS is None, reason="no corpus beside the repository"),
+    pytest.mark.skipif(downward.translator() is None, reason="the package up-fast-downward is not installed"),
+]
+
+# What is not STRIPS, by the names of the corpus's index; `not` may stand in effects. Fast Downward takes
+# every negative condition of a predicate that changes for possible; bbtc asks whether the atom changes.
+_BEYOND = {"when", "forall", "exists", "or", "imply", "derived", "numeric", "pddl3", "either"}
+_SECONDS = 20
+_LARGEST = 30_000  # bytes of a problem; the smallest of each folder
+
+
+def _pairs() -> list[tuple[str, str]]:
+    if CORPUS is None:
+        return []
+    corpus = read_corpus(CORPUS)
+    with (CORPUS / "INDEX.tsv").open(newline="", encoding="utf-8") as lines:
+        rows = {row["path"]: row for row in csv.DictReader(lines, delimiter="\t", quoting=csv.QUOTE_NONE)}
+    found: dict[str, list[tuple[int, str, str]]] = {}
+    for problem in corpus.families["classical"]:
+        for domain in corpus.partners.get(problem, ()):
+            size = int(rows[problem]["bytes"])
+            used = {*rows[problem]["features"].split(","), *rows[domain]["features"].split(",")}
+            odd = domain in corpus.odd or problem in corpus.odd
+            if size <= _LARGEST and not used & _BEYOND and not odd:
+                found.setdefault(str(Path(problem).parent), []).append((size, domain, problem))
+    return [pair[1:] for pairs in found.values() for pair in sorted(pairs)[:1]]
+
+
+@pytest.mark.parametrize(("domain", "problem"), _pairs(), ids=lambda path: path.replace("/", "-"))
+def test_the_actions_are_those_that_fast_downward_finds(domain: str, problem: str) -> None:
+    assert CORPUS is not None
+    try:
+        theirs = downward.explore(CORPUS / domain, CORPUS / problem, names=True, timeout=_SECONDS)
+    except subprocess.TimeoutExpired:
+        pytest.skip(f"Fast Downward takes longer than {_SECONDS} s")
+    if not theirs.reachable:
+        pytest.skip("the goal cannot be reached")
+    report = Report()
+    inputs = select(parse_all([read_source(str(CORPUS / f)) for f in (domain, problem)], report), report)
+    report.raise_errors()
+    assert inputs is not None
+    task = instantiate(resolve_model(inputs, report, checks=False), report, Limits())
+    ours = sorted(f"({' '.join((action.schema, *action.args))})".lower() for action in task.actions)
+    assert ours == sorted(name.replace(" )", ")") for name in theirs.names)
