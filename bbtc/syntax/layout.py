@@ -144,7 +144,7 @@ class Setter:
         self._form(item, indent, tail)
 
     def _comment(self, comment: Comment, indent: int, spaced: bool) -> None:
-        if not comment.own_line:
+        if not comment.own_line and not self._ended:
             self._line += f" {comment.text}" if self._line.strip() else comment.text
         else:
             if spaced or _follows_empty_line(comment.span):

@@ -141,7 +141,8 @@ class _Docs:
             # Not written: it goes before what follows, and after the comments before that.
             rest = re.compile(r"\s*").match(self._text, after)
             start = rest.end() if rest else after
-            return Doc(f"{word} (", self.groups(entries), ")", span._replace(start=start, end=start))
+            here = span._replace(start=start, end=start)
+            return Doc(f"{word} (", self.groups(entries), ")", here, glued=1, filled=True)
         start = place.end if place else after
         last = entries[-1].span.end if entries else start
         around = self._parentheses(start, last, span)
@@ -174,13 +175,18 @@ class _Docs:
         names = tuple(map(_leaf, node.names))
         if not node.types:
             return Doc("", names, "", node.span, filled=True)
-        types = [_leaf(name) for name in node.types]
-        first, last = node.types[0].span, node.types[-1].span
-        span = Span(first.source, first.start, last.end)
-        kind = Doc(f"- {types[0].open}", span=span)
+        typed = self.types(node.types, node.names[-1].span.end, node.span)
+        return Doc("", (*names, typed), "", node.span, filled=True)
+
+    def types(self, types: tuple[ast.Name, ...], after: int, span: Span) -> Doc:
+        """``- t`` or ``- (either t u)``."""
+        dash = self._word("-", after, span) or types[0].span
+        kind = _leaf(types[0])
         if len(types) > 1:
-            kind = Doc("- (either", tuple(types), ")", span._replace(end=node.span.end), filled=True)
-        return Doc("", (*names, kind), "", node.span, filled=True)
+            around = self._parentheses(dash.end, types[-1].span.end, span)
+            kind = Doc("(either", tuple(map(_leaf, types)), ")", around, filled=True)
+        end = kind.span.end if kind.span else span.end
+        return Doc("-", (kind,), "", Span(span.source, dash.start, end), glued=1)
 
     def predicate(self, node: ast.PredicateDeclaration) -> Doc:
         if not node.three_valued:
@@ -191,9 +197,13 @@ class _Docs:
         return Doc("(unknown", (inner,), ")", node.span, glued=1)
 
     def function(self, node: ast.FunctionDeclaration) -> Doc:
-        types = " ".join(name.text for name in node.types)
-        close = f") - {types}" if len(node.types) == 1 else f") - (either {types})" if types else ")"
-        return Doc(f"({node.name.text}", self.groups(node.parameters), close, node.span, filled=True)
+        last = node.parameters[-1].span.end if node.parameters else node.name.span.end
+        # A bare name has no parentheses in the source.
+        around = self._parentheses(node.span.start, last, node.span) or node.name.span
+        head = Doc(f"({node.name.text}", self.groups(node.parameters), ")", around, filled=True)
+        if not node.types:
+            return head
+        return Doc("", (head, self.types(node.types, around.end, node.span)), "", node.span, filled=True)
 
     # --- problems ----------------------------------------------------------------------------
 

@@ -1,0 +1,202 @@
+"""Hypothesis strategies: random syntax trees that some text stands for."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+from bbtc.kleene import Truth
+from bbtc.source import SourceFile, Span
+from bbtc.syntax import ast
+from bbtc.syntax.hints import CONNECTIVES
+
+S = Span(SourceFile("none", ""), 0, 0)
+
+# Words that have a meaning of their own somewhere, or that lexers trip over.
+_ODD = [
+    "a-b",
+    "x1",
+    "_",
+    "3d",
+    "p.q",
+    "at",
+    "domain",
+    "define",
+    "condition",
+    "action",
+    "number",
+    "object",
+    "e5",
+]
+_RESERVED = {*CONNECTIVES, "either", "scale-up", "scale-down", "invariant"}
+_BODIES = {"sequence", "fallback", "skipper", "condition", "action", "foreach"}
+WORDS = st.one_of(
+    st.sampled_from(_ODD), st.from_regex(r"\A[A-Za-z_][A-Za-z0-9_.*+@#$%!~-]{0,8}[A-Za-z0-9_]\Z")
+).filter(lambda word: word.lower() not in _RESERVED)
+names = WORDS.map(lambda text: ast.Name(text, S))
+# An object in an equation must not look like a number.
+objects = st.from_regex(r"\A[A-Za-z_][a-z0-9]{0,5}\Z").map(lambda text: ast.Name(text, S))
+variables = WORDS.map(lambda text: ast.Variable(f"?{text}", S))
+# A variable with a hyphen may be read as one that lacks the space before its type.
+parameters = st.from_regex(r"\A\?[A-Za-z_][a-z0-9_]{0,5}\Z").map(lambda text: ast.Variable(text, S))
+numbers = st.one_of(
+    st.sampled_from(["0", "1", ".5", "1/10", "0.1460833899262879", "1e-3", "7.", "100"]),
+    st.integers(0, 999).map(str),
+).map(lambda text: ast.Number(text, S))
+terms = st.one_of(names, variables)
+
+
+def tuples(
+    items: st.SearchStrategy[object], low: int = 0, high: int = 3
+) -> st.SearchStrategy[tuple[object, ...]]:
+    return st.lists(items, min_size=low, max_size=high).map(tuple)
+
+
+def build(node: type, *parts: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
+    """The node with random parts."""
+    return st.builds(lambda *given: node(*given, S), *parts)
+
+
+def typed_lists(words: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
+    """Groups with types, and at the end maybe one without."""
+    typed = build(ast.TypedGroup, tuples(words, 1), tuples(names, 1, 2))
+    untyped = build(ast.TypedGroup, tuples(words, 1), st.just(()))
+    return st.builds(lambda many, last: (*many, *last), tuples(typed, 0, 2), tuples(untyped, 0, 1))
+
+
+atoms = build(ast.Atom, names, tuples(terms))
+fluents = build(ast.FluentRef, names, tuples(terms))
+facts = st.builds(lambda atom, value: ast.Assign(atom, value, S), atoms, st.sampled_from(Truth))
+
+
+def _formula(inner: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
+    return st.one_of(
+        build(ast.Not, inner),
+        build(ast.And, tuples(inner)),
+        build(ast.Or, tuples(inner)),
+        build(ast.Imply, inner, inner),
+        build(ast.Quantified, st.sampled_from(["exists", "forall"]), typed_lists(parameters), inner),
+    )
+
+
+formulas = st.recursive(
+    st.one_of(
+        atoms,
+        st.just(ast.Empty(S)),
+        build(ast.Equality, st.one_of(objects, parameters), st.one_of(objects, parameters)),
+        build(ast.Test, st.sampled_from(["unknown", "known"]), atoms),
+        st.just(ast.Unsupported("numeric comparison", "(>= (energy ?r) 8)", S)),
+        st.just(ast.Unsupported("preference", "(preference p1 (and (q) r))", S)),
+    ),
+    _formula,
+    max_leaves=6,
+)
+expressions = st.recursive(
+    st.one_of(numbers, fluents),
+    lambda inner: build(ast.Arithmetic, st.sampled_from("+-*/"), tuples(inner, 1)),
+    max_leaves=3,
+)
+changes = build(
+    ast.FluentEffect,
+    st.sampled_from(["increase", "decrease", "assign", "scale-up", "scale-down"]),
+    fluents,
+    expressions,
+)
+
+
+def _chance(inner: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
+    return build(ast.Probabilistic, tuples(build(ast.Branch, numbers, inner)))
+
+
+def _effect(inner: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
+    return st.one_of(
+        build(ast.EffectAnd, tuples(inner)),
+        build(ast.When, formulas, inner),
+        build(ast.EffectForall, typed_lists(parameters), inner),
+        _chance(inner),
+        build(ast.OneOf, tuples(inner)),
+    )
+
+
+effects = st.recursive(st.one_of(facts, changes, st.just(ast.Empty(S))), _effect, max_leaves=6)
+choices = st.recursive(
+    st.one_of(facts, st.just(ast.Empty(S))),
+    lambda inner: st.one_of(
+        build(ast.EffectAnd, tuples(inner)),
+        build(ast.OneOf, tuples(inner)),
+        _chance(inner),
+        build(ast.EffectForall, typed_lists(parameters), inner),
+    ),
+    max_leaves=4,
+)
+clauses = st.one_of(build(ast.Or, tuples(formulas)), build(ast.Imply, formulas, formulas)).map(
+    lambda formula: ast.InitClause(formula, S)  # type: ignore[arg-type]
+)
+initial = st.recursive(
+    st.one_of(
+        # `(and …)` and `()` stand for themselves at this level.
+        choices.filter(lambda choice: not isinstance(choice, ast.EffectAnd)),
+        clauses,
+        build(ast.FluentValue, fluents, numbers),
+        build(ast.Invariant, tuples(formulas, 1)),
+        st.just(ast.Unsupported("timed initial literal", "(at 5 (p a))", S)),
+    ),
+    lambda inner: build(ast.InitAnd, tuples(inner)),
+    max_leaves=4,
+)
+calls = WORDS.filter(lambda word: word.lower() not in _BODIES).map(lambda text: ast.Name(text, S))
+bodies = st.recursive(
+    st.one_of(
+        build(ast.BodyCondition, formulas),
+        build(ast.BodyCall, st.sampled_from([None, "action"]), calls, tuples(terms)),
+    ),
+    lambda inner: st.one_of(
+        build(ast.BodyControl, st.sampled_from(["sequence", "fallback", "skipper"]), tuples(inner)),
+        build(ast.BodyForeach, typed_lists(parameters), inner),
+    ),
+    max_leaves=5,
+)
+observations = st.one_of(formulas, _chance(effects)).map(lambda content: ast.Observation(content, S))  # type: ignore[arg-type]
+
+
+def _derived(parameters: ast.TypedList, head: ast.Name, condition: ast.Formula) -> ast.Derived:
+    args = tuple(name for group in parameters for name in group.names)
+    return ast.Derived("derived", parameters, ast.Atom(head, args, S), condition, S)
+
+
+def optional(strategy: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
+    return st.one_of(st.none(), strategy)
+
+
+sections = st.one_of(
+    build(ast.Requirements, tuples(st.sampled_from([ast.Name(":typing", S), ast.Name(":ADL", S)]))),
+    build(ast.TypedSection, st.sampled_from(["types", "constants", "objects"]), typed_lists(names)),
+    build(
+        ast.Predicates,
+        tuples(build(ast.PredicateDeclaration, names, typed_lists(variables), st.booleans())),
+    ),
+    build(
+        ast.Functions,
+        tuples(build(ast.FunctionDeclaration, names, typed_lists(variables), tuples(names, 0, 1))),
+    ),
+    build(
+        ast.Action,
+        names,
+        typed_lists(parameters),
+        optional(formulas),
+        optional(observations),
+        optional(effects),
+    ),
+    build(ast.Template, names, typed_lists(parameters), optional(formulas), optional(effects), bodies),
+    build(ast.Sensor, names, typed_lists(parameters), optional(formulas), formulas),
+    st.builds(_derived, typed_lists(parameters), names, formulas),
+    build(ast.Derived, st.just("axiom"), typed_lists(parameters), atoms, formulas),
+    build(ast.DomainReference, names),
+    build(ast.Init, tuples(initial, 0, 5)),
+    build(ast.Hidden, tuples(facts.filter(lambda fact: fact.value is not Truth.UNKNOWN))),
+    build(ast.Goal, formulas),
+    build(ast.GoalNumber, st.sampled_from(["goal-probability", "goal-reward"]), numbers),
+    build(ast.Metric, st.sampled_from(["minimize", "maximize"]), expressions),
+    st.just(ast.Unsupported(":constraints", "(:constraints (and (always (p))))", S)),
+)
+definitions = build(ast.Definition, st.sampled_from(["domain", "problem"]), names, tuples(sections, 0, 4))
+documents = tuples(definitions, 1, 2).map(lambda found: ast.Document(SourceFile("none", ""), found))  # type: ignore[arg-type]
