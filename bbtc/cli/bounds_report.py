@@ -10,6 +10,7 @@ from bbtc.cli.wording import counted, exact
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.plan.bounds import TaskValue
+from bbtc.plan.why_not import DeadEnd
 from bbtc.tree.nodes import Tree
 
 
@@ -47,6 +48,14 @@ def bounds_lines(tree: Tree) -> list[str]:
     if tree.bounds is None:
         return []
     return [f"the best that any policy can do is {best_possible(*tree.bounds)}"]
+
+
+def dead_end_line(end: DeadEnd) -> str:
+    """One reason why a target is out of reach, with the line of the action it is due to."""
+    why = " and ".join(end.lost) or "the goal as a whole"
+    when = "from the start" if end.action is None else f"after {end.action}"
+    place = "" if end.span is None else f" [{end.span.place}]"
+    return f"  {exact(end.probability)}: {when}{place}, nothing can bring about {why}"
 
 
 def bounds_json(value: TaskValue, target: Fraction) -> str:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -122,11 +127,12 @@ def run_planner(
     quiet: bool,
 ) -> Plan:
     """Plan, telling the session each refinement as it is made and how planning ended."""
-    from bbtc.cli.bounds_report import bounds_lines
+    from bbtc.cli.bounds_report import bounds_lines, dead_end_line
     from bbtc.cli.wording import exact, plan_summary, refinement_line
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
     from bbtc.plan.options import DEFAULTS
+    from bbtc.plan.why_not import dead_ends
 
     count = 0
 
@@ -140,7 +146,8 @@ def run_planner(
     if not quiet:
         wanted = task.goal_probability if target is None else target
         session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
-    plan = plan_task(task, target, strategy, limits, tell, options=options or DEFAULTS)
+    with _terminated_like_interrupted():
+        plan = plan_task(task, target, strategy, limits, tell, options=options or DEFAULTS)
     if plan.tree.status == "stuck":
         session.report.warning(
             "BBT0502",
@@ -150,4 +157,23 @@ def run_planner(
         )
     for line in [*plan_summary(plan), *bounds_lines(plan.tree)]:
         session.say(line)
+    for end in dead_ends(plan.tree, replace(limits, seconds=None)):
+        session.say(dead_end_line(end))
     return plan
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """SIGTERM ends planning as Ctrl-C does: with the best tree so far."""
+
+    def stop(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

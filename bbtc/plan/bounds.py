@@ -79,5 +79,7 @@ def judged(plan: Plan, limits: Limits, options: Options = DEFAULTS) -> Plan:
         lower, upper = max(lower, value.lower), value.upper
     except (LimitReached, MemoryError):
         pass
+    except KeyboardInterrupt:
+        return replace(plan, tree=replace(tree, status="interrupted"))
     status = "out-of-reach" if upper < tree.target else tree.status
     return replace(plan, tree=replace(tree, status=status, bounds=(lower, upper)))

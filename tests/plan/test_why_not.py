@@ -1,0 +1,96 @@
+"""Why a target is out of reach, and what an interrupted run leaves behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from bbtc.ground.condition import Is, conjunction
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.pipeline import plan_task
+from bbtc.plan import policy
+from bbtc.plan.why_not import dead_ends
+from tests.domains.problems import REPOSITORY, bbtc
+from tests.plan.test_bounds import ONESHOT, one_shot
+from tests.plan.test_refine import action, task
+
+T, F = Truth.TRUE, Truth.FALSE
+
+
+def test_the_action_that_leads_into_a_dead_end_is_named() -> None:
+    tree = plan_task(one_shot(), Fraction("0.9"), "policy", Limits(), lambda _: None).tree
+    (end,) = dead_ends(tree, Limits())
+    assert (end.probability, end.action, end.lost) == (Fraction(1, 2), "try()", ("goal()",))
+
+
+def test_what_nothing_achieves_is_named_from_the_start() -> None:
+    of = task("a b", {}, conjunction([Is(0, T), Is(1, T)]), action("b", Is(1, F), ("1", {1: T})))
+    tree = plan_task(of, Fraction(1), "policy", Limits(), lambda _: None).tree
+    (end,) = dead_ends(tree, Limits())
+    assert (end.probability, end.action, end.lost) == (1, None, ("a()",))
+
+
+def test_a_target_that_is_reached_has_no_dead_ends_to_explain() -> None:
+    tree = plan_task(one_shot(), Fraction("0.5"), "policy", Limits(), lambda _: None).tree
+    assert dead_ends(tree, Limits()) == ()
+
+
+def test_the_report_cites_the_line_of_the_action(tmp_path: Path) -> None:
+    file = tmp_path / "oneshot.pddl"
+    file.write_text(ONESHOT)
+    done = bbtc("plan", str(file))
+    assert done.status == 1
+    assert "after try() [" in done.err
+    assert "oneshot.pddl:4:" in done.err
+    assert "nothing can bring about done()" in done.err
+
+
+def test_an_interrupt_leaves_the_best_tree_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(policy, "with_least_attempts", interrupted)
+    again = action("again", Is(0, F), ("1/2", {0: T}), ("1/2", {}))
+    of = task("a", {}, Is(0, T), again)
+    tree = plan_task(of, Fraction("0.9"), "policy", Limits(), lambda _: None).tree
+    assert tree.success_probability == 1, "the tree that tries without end was there already"
+    monkeypatch.setattr(policy, "synthesize", interrupted)
+    tree = plan_task(of, Fraction("0.9"), "policy", Limits(), lambda _: None).tree
+    assert (tree.status, tree.success_probability) == ("interrupted", 0)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals are sent as on POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_planning_with_a_tree(tmp_path: Path, number: signal.Signals) -> None:
+    """Many switches: more states than can be explored in the time."""
+    switches = " ".join(f"(s{i})" for i in range(60))
+    actions = " ".join(f"(:action on{i} :precondition (not (s{i})) :effect (s{i}))" for i in range(60))
+    goal = " ".join(f"(s{i})" for i in range(60))
+    file = tmp_path / "switches.pddl"
+    file.write_text(
+        f"(define (domain d) (:predicates {switches}) {actions})"
+        f"(define (problem p) (:domain d) (:init) (:goal (and {goal})))"
+    )
+    command = [sys.executable, "-m", "bbtc.cli.main", "plan", str(file), "--strategy", "policy"]
+    run = subprocess.Popen(
+        [*command, "--max-states", "1000000000"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=REPOSITORY,
+    )
+    assert run.stderr is not None
+    run.stderr.readline()  # planning has begun
+    time.sleep(1)
+    run.send_signal(number)
+    out, err = run.communicate(timeout=60)
+    assert run.returncode == 130, err
+    assert json.loads(out)["status"] == "interrupted"
