@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import subprocess
 from pathlib import Path
 
@@ -23,8 +24,7 @@ pytestmark = [
     pytest.mark.skipif(downward.translator() is None, reason="the package up-fast-downward is not installed"),
 ]
 
-# What is not STRIPS, by the names of the corpus's index; `not` may stand in effects. Fast Downward takes
-# every negative condition of a predicate that changes for possible; bbtc asks whether the atom changes.
+# What is not STRIPS, by the names of the corpus's index; `not` may stand in effects.
 _BEYOND = {"when", "forall", "exists", "or", "imply", "derived", "numeric", "pddl3", "either"}
 _SECONDS = 20
 _LARGEST = 30_000  # bytes of a problem; the smallest of each folder
@@ -62,4 +62,15 @@ def test_the_actions_are_those_that_fast_downward_finds(domain: str, problem: st
     assert inputs is not None
     task = instantiate(resolve_model(inputs, report, checks=False), report, Limits())
     ours = sorted(f"({' '.join((action.schema, *action.args))})".lower() for action in task.actions)
-    assert ours == sorted(name.replace(" )", ")") for name in theirs.names)
+    found = sorted(name.replace(" )", ")") for name in theirs.names)
+    if _has_negative_conditions(CORPUS / domain):
+        # Fast Downward leaves negative conditions out of its relaxation; enumeration agrees with bbtc.
+        assert set(ours) <= set(found)
+    else:
+        assert ours == found
+
+
+def _has_negative_conditions(domain: Path) -> bool:
+    """Whether `not` stands between a precondition and the effect after it."""
+    text = re.sub(r";[^\n]*", "", domain.read_text("latin-1")).lower()
+    return any("(not" in part.split(":effect")[0] for part in text.split(":precondition")[1:])
