@@ -16,7 +16,7 @@ from typing import NamedTuple
 from bbtc.syntax.scan import Fault, blank
 
 # A parenthesis with the word after it, or a field.
-_MARK = re.compile(r"\(\s*([^\s()?]*)|\)|(?<![^\s()]):[a-z-]+", re.IGNORECASE | re.ASCII)
+_MARK = re.compile(r"\(\s*([^\s()?]*)|\)|(?<![^\s()])(?::[a-z-]+|define(?=\s*\())", re.IGNORECASE | re.ASCII)
 _INDENT = re.compile(r"[ \t]*")
 MAX_FAULTS = 100
 """With more than these, the text is not PDDL with a slip."""
@@ -56,7 +56,8 @@ def _under(opener: Opener, indent: str) -> bool:
 
 
 class Extra(NamedTuple):
-    """A closing parenthesis too many, and the last section before it."""
+    """A fault that may come from a mistake in a section: its number, the section's start, and where
+    the fault shows."""
 
     fault: int
     section: int
@@ -70,6 +71,8 @@ class Balance:
     text: str
     faults: list[Fault] = field(default_factory=list)
     extras: list[Extra] = field(default_factory=list)
+    open_end: Extra | None = None
+    """The fault that the last definition is never closed, and its last section."""
     _edited: bytearray = field(default_factory=bytearray)
     _stack: list[Opener] = field(default_factory=list)
     _suspect: Opener | None = None
@@ -79,6 +82,7 @@ class Balance:
     _closed_section: Opener | None = None
     _section_end: int = 0
     _broken: bool = False
+    _headless: bool = False
     _line: tuple[int, int, str] = (0, -1, "")
     """Start and end of the current line, and its indentation."""
     _surplus_run: bool = False
@@ -98,7 +102,7 @@ class Balance:
             elif text[start] == "(":
                 self._open(start, match[1].lower())
             else:
-                self._field(start, match.group().lower())
+                self._word(start, match.group().lower())
             if len(self.faults) > MAX_FAULTS:
                 return self
         if self._stack:
@@ -145,6 +149,24 @@ class Balance:
             self._surplus += len(self._stack) - 1
         del self._stack[1:]
 
+    def _word(self, start: int, word: str) -> None:
+        """A keyword without a parenthesis of its own: a field, or a form that lacks it."""
+        lacks = word in _SECTIONS if len(self._stack) == 1 else word == "define" and not self._stack
+        if not lacks:
+            self._field(start, word)
+            return
+        end = start + len(word)
+        self.faults.append(
+            Fault("BBT0101", f"`{word}` lacks its parenthesis", start, end, f"write `({word}`")
+        )
+        if self._edited[start - 1 : start].isspace():
+            self._edited[start - 1] = ord("(")
+            self._open(start - 1, word)
+        else:
+            # At the start of the file there is no place for the parenthesis.
+            self._open(start, word)
+            self._headless = True
+
     def _field(self, start: int, word: str) -> None:
         stack, closed = self._stack, self._closed_section
         if len(stack) > 2 and word in _FIELDS.get(stack[1].word, ()):
@@ -176,6 +198,9 @@ class Balance:
                 blank(self._edited, opener.start, start + 1)
         elif not self._stack and opener.word == "define":
             self._closed, self._closed_at = opener, start
+            if self._headless:
+                blank(self._edited, opener.start, start + 1)
+                self._headless = False
 
     def _end(self) -> None:
         stack, end = self._stack, len(self.text)
@@ -187,8 +212,10 @@ class Balance:
                 blank(self._edited, self._section, end)
         else:
             group = stack
+        if len(group) == 1 and group[0].word == "define" and self._suspect is None:
+            self.open_end = Extra(len(self.faults), self._section, end)
         self._unclosed(group, end, "the file ends")
-        if stack[0].word == "define":
+        if stack[0].word == "define" and not self._headless:
             self._edited += b")"
         else:
             blank(self._edited, stack[0].start, end)

@@ -104,6 +104,7 @@ def _expression(operand: Any) -> ast.NumericExpression | None:
         case ast.Number() | ast.FluentRef() | ast.Arithmetic():
             return operand
         case ast.Name():
+            leaves.refuse_head(operand.text, operand.span, "a number or a numeric fluent")
             return ast.FluentRef(operand, (), operand.span)
         case _:
             return None
@@ -272,6 +273,10 @@ class Builder:
         span = _covering(parts)
         content = parts[0] if len(parts) == 1 else ast.And(tuple(parts), span)
         return Field("observe", keyword, ast.Observation(content, span))
+
+    def observe_agent(self, children: list[Any]) -> Field:
+        message = "`:observe-agent`, an observation by one of several agents, is not supported"
+        raise Misuse("BBT0212", message, of(children[0]))
 
     def derived(self, children: list[Any]) -> ast.Derived:
         form, head, parameters, close, condition, end = children

@@ -162,10 +162,15 @@ def atom(token: Token) -> Atom:
     printing would turn into a form."""
     if token.kind == "FLAT":
         return flat(token)
-    if token.text.lower() in _HEADS:
-        hint = f"its parts stand with it in parentheses: `({token.text.lower()} …)`"
-        raise Misuse("BBT0101", f"expected a condition or an effect, found `{token.text}`", of(token), hint)
+    refuse_head(token.text, of(token), "a condition or an effect")
     return Atom(name(token), (), of(token))
+
+
+def refuse_head(text: str, span: Span, expected: str) -> None:
+    """Raise :class:`Misuse` for a bare word that heads a form: printing it would turn it into one."""
+    if text.lower() in _HEADS:
+        hint = f"its parts stand with it in parentheses: `({text.lower()} …)`"
+        raise Misuse("BBT0101", f"expected {expected}, found `{text}`", span, hint)
 
 
 def negated(token: Token) -> Atom:

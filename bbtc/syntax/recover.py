@@ -94,20 +94,29 @@ class _Recovery:
             self.faults.append(fault)
 
     def _left_outside(self, fault: Fault) -> bool:
-        """Is an error what a parenthesis too many leaves behind? Then that parenthesis stands right
-        before the error, not at the end of the section, where the count showed it."""
+        """Settle an error with what the count of parentheses showed at the end of its section.
+
+        If a form is left outside by a parenthesis too many, that one stands right before the form.
+        Any other error explains the count, which then needs no message of its own.
+        """
         before = self._balance.text[: fault.start].rstrip()
-        for extra in self._balance.extras:
-            known = self._balance.faults[extra.fault]
-            if known in self.faults and extra.section <= fault.start < extra.start and before.endswith(")"):
-                self.faults[self.faults.index(known)] = known._replace(
-                    message="this parenthesis closes its form too early",
-                    start=len(before) - 1,
-                    end=len(before),
-                    hint="remove it",
-                    related=("this is left outside", fault.start, fault.end),
-                )
-                return True
+        form = self._balance.text.startswith("(", fault.start)
+        ends = [self._balance.open_end] if self._balance.open_end else []
+        for shown in (*self._balance.extras, *ends):
+            known = self._balance.faults[shown.fault]
+            if known not in self.faults or not shown.section <= fault.start < shown.start:
+                continue
+            if known.code == "BBT0102" or not form or not before.endswith(")"):
+                self.faults.remove(known)
+                return False
+            self.faults[self.faults.index(known)] = known._replace(
+                message="this parenthesis closes its form too early",
+                start=len(before) - 1,
+                end=len(before),
+                hint="remove it",
+                related=("this is left outside", fault.start, fault.end),
+            )
+            return True
         return False
 
     def _part(self, place: Place, forms: list[Form]) -> tuple[int, int]:
