@@ -16,6 +16,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.plan.strategies import DEFAULT
 
 
 def _list_formats(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
@@ -48,7 +49,7 @@ def _list_formats(ctx: click.Context, _parameter: click.Parameter, value: bool) 
     "-O", "--option", "options", multiple=True, metavar="NAME=VALUE", help="An option of the format."
 )
 @click.option("--target", type=Probability(), help="With DOMAIN: wanted success probability.")
-@click.option("--strategy", default="refine", show_default=True, help="With DOMAIN: how to plan.")
+@click.option("--strategy", default=DEFAULT, show_default=True, help="With DOMAIN: how to plan.")
 @limit_options
 @output_options
 @session_command

@@ -23,6 +23,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.plan.strategies import DEFAULT
 
 if TYPE_CHECKING:
     from bbtc.ground.task import Task
@@ -45,7 +46,7 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option(
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
-@click.option("--strategy", default="refine", show_default=True, help="How to plan: refine, policy or auto.")
+@click.option("--strategy", default=DEFAULT, show_default=True, help="How to plan: refine, policy or auto.")
 @click.option("--max-actions", type=click.IntRange(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",

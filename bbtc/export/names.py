@@ -96,11 +96,6 @@ def camel(text: str) -> str:
     return _base(text, "camel")
 
 
-def snake(text: str) -> str:
-    """A snake_case identifier for any text, not injective."""
-    return _base(text, "snake")
-
-
 def printable(text: str) -> str:
     """The text on one line, with a replacement character for whatever does not print (among it
     all that XML 1.0 cannot hold)."""

@@ -78,7 +78,7 @@ class _Relevance:
         self._read(self.task.goal)
         if self.task.metric == "reward":
             for index, action in enumerate(self.task.actions):
-                if any(outcome.reward for outcome in _outcomes(action.factors)):
+                if any(outcome.reward for outcome in gt.outcomes_of(action.factors)):
                     self._keep_action(index)
         while self._fresh:
             variable = self._fresh.pop()
@@ -110,7 +110,7 @@ class _Relevance:
             self.templates.add(current)
             template = self.task.templates[current]
             self._read(template.precondition)
-            for part in _body_parts(template.body):
+            for part in gt.walk_body(template.body):
                 match part:
                     case gt.BodyCondition(condition):
                         self._read(condition)
@@ -124,25 +124,10 @@ class _Relevance:
                         assert_never(part)
 
 
-def _outcomes(factors: Iterable[gt.Factor]) -> Iterator[gt.Outcome]:
-    for factor in factors:
-        for outcome in factor.outcomes:
-            yield outcome
-            yield from _outcomes(outcome.factors)
-
-
 def _settings(factors: Iterable[gt.Factor]) -> Iterator[tuple[Condition | None, int]]:
-    for outcome in _outcomes(factors):
-        for effect in outcome.effects:
-            for variable, _ in effect.sets:
-                yield effect.when, variable
-
-
-def _body_parts(body: gt.Body) -> Iterator[gt.Body]:
-    yield body
-    if isinstance(body, gt.BodyControl):
-        for child in body.children:
-            yield from _body_parts(child)
+    for effect in gt.effects_of(factors):
+        for variable, _ in effect.sets:
+            yield effect.when, variable
 
 
 # --- leaving out -----------------------------------------------------------------------------

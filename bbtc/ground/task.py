@@ -6,12 +6,13 @@ and costs are exact rationals.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Literal, TypeAlias
 
-from bbtc.ground.condition import TRUE, Condition
+from bbtc.ground.condition import Condition
 from bbtc.kleene import Truth
 from bbtc.source import Span
 
@@ -203,4 +204,27 @@ class Task:
 
 
 NO_CHANGE = Factor((Outcome(Fraction(1), ()),))
-NO_PRECONDITION = TRUE
+
+
+def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:
+    """Every outcome of some factors, nested ones included, each before those nested in it."""
+    for factor in factors:
+        for outcome in factor.outcomes:
+            yield outcome
+            yield from outcomes_of(outcome.factors)
+
+
+def effects_of(factors: Iterable[Factor]) -> Iterator[Effect]:
+    """Every effect that some occurrence of the factors can have."""
+    return (effect for outcome in outcomes_of(factors) for effect in outcome.effects)
+
+
+def walk_body(body: Body) -> Iterator[Body]:
+    """Every part of a template body, parents first, from left to right. Called templates are not
+    followed."""
+    stack = [body]
+    while stack:
+        part = stack.pop()
+        yield part
+        if isinstance(part, BodyControl):
+            stack.extend(reversed(part.children))

@@ -12,10 +12,10 @@ from fractions import Fraction
 
 from bbtc.belief.state import State, Transition, Values, compile_action
 from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
-from bbtc.ground.task import GroundAction, Task
+from bbtc.ground.task import GroundAction, Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.plan.draft import Doing, Subgoal, changed_by
-from bbtc.plan.relaxed import RelaxedReachability, effects_of, possible
+from bbtc.plan.relaxed import RelaxedReachability, possible
 
 OPEN_SHARE = Fraction(1, 2)
 """An outcome that leaves a false condition unknown counts this much: it may still be observed true."""

@@ -41,6 +41,7 @@ from bbtc.ground.task import (
     GroundAction,
     GroundTemplate,
     Task,
+    effects_of,
 )
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node
@@ -105,15 +106,6 @@ class Draft:
         """The draft the paper starts from: the goal's conditions, nothing inserted."""
         return cls(task, [Subgoal(part, None) for part in conjuncts(task.goal) or (task.goal,)])
 
-    def subgoals(self) -> Iterator[Subgoal]:
-        """Every subgoal, parents first."""
-        stack = list(reversed(self.goals))
-        while stack:
-            subgoal = stack.pop()
-            yield subgoal
-            for attempt in subgoal.attempts():
-                stack.extend(reversed(attempt.preconditions))
-
 
 def new_attempt(subgoal: Subgoal, doing: Doing | None, conditions: list[Condition]) -> Attempt:
     """An attempt with a fresh subgoal for each precondition."""
@@ -145,13 +137,7 @@ def changed_by(task: Task, body: Body) -> frozenset[int]:
 
 def changes(action: GroundAction) -> frozenset[int]:
     """Variables that an action can change."""
-    found: set[int] = set()
-    factors = list(action.factors)
-    while factors:
-        for outcome in factors.pop().outcomes:
-            factors.extend(outcome.factors)
-            found.update(variable for effect in outcome.effects for variable, _ in effect.sets)
-    return frozenset(found)
+    return frozenset(variable for effect in effects_of(action.factors) for variable, _ in effect.sets)
 
 
 class _Freezer:

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from typing_extensions import assert_never
 
 from bbtc.belief.state import Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
-from bbtc.ground.task import Effect, Factor, GroundAction, Task
+from bbtc.ground.task import GroundAction, Task, effects_of
 
 Facts = set[tuple[int, int]]
 """Pairs of variable and value that are possible."""
-
-
-def effects_of(factors: tuple[Factor, ...]) -> Iterator[Effect]:
-    """Every effect that some occurrence of the factors can have."""
-    for factor in factors:
-        for outcome in factor.outcomes:
-            yield from outcome.effects
-            yield from effects_of(outcome.factors)
 
 
 def possible(condition: Condition, facts: Facts) -> bool:

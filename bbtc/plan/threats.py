@@ -11,11 +11,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bbtc.ground.condition import evaluate
-from bbtc.ground.task import Effect, GroundAction, GroundTemplate, Task
+from bbtc.ground.task import Effect, GroundAction, GroundTemplate, Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.plan.choose import Target
 from bbtc.plan.draft import Attempt, Draft, Subgoal, actions_in
-from bbtc.plan.relaxed import effects_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from bbtc.ground.task import (
     BodyTemplate,
     GroundTemplate,
     Task,
+    walk_body,
 )
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 
@@ -175,20 +176,11 @@ def active_templates(templates: Mapping[str, GroundTemplate]) -> dict[str, bool]
 
 
 def _calls(body: Body) -> list[str]:
-    return [part.template for part in _walk_body(body) if isinstance(part, BodyTemplate)]
+    return [part.template for part in walk_body(body) if isinstance(part, BodyTemplate)]
 
 
 def _acts(body: Body, active: Mapping[str, bool]) -> bool:
     return any(
         isinstance(part, BodyAction) or (isinstance(part, BodyTemplate) and active.get(part.template, False))
-        for part in _walk_body(body)
+        for part in walk_body(body)
     )
-
-
-def _walk_body(body: Body) -> Iterator[Body]:
-    stack = [body]
-    while stack:
-        part = stack.pop()
-        yield part
-        if isinstance(part, BodyControl):
-            stack.extend(reversed(part.children))
