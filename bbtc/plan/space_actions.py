@@ -14,12 +14,13 @@ from bbtc.belief.state import Transition, compile_action
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Effect, Factor, Task
 from bbtc.kleene import Truth
-from bbtc.plan.space_packing import BitTest, Cube, Flags, Packing, Words, bit_test, cubes, holds
+from bbtc.plan.space_packing import WORD, BitTest, Cube, Flags, Packing, Words, bit_test, cubes, holds
 
 Index: TypeAlias = npt.NDArray[np.int64]
 
 _MOST_OUTCOMES = 128  # joint outcomes of one action; above, results are merged factor by factor
 _MOST_CUBES = 32  # disjuncts of one condition
+_FEW_CELLS = 1 << 16  # states times preconditions that are tried one with each other
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,8 @@ class ActionTables:
     pre_mask: Words = field(init=False)
     pre_value: Words = field(init=False)
     repeats: bool = field(init=False, default=False)
+    _literal: Index = field(init=False)
+    _literal_first: Index = field(init=False)
     general: list[tuple[int, BitTest]] = field(init=False, default_factory=list)
 
     # Outcomes: rows ordered by action, numbered as `draws`; guarded parts in rows of their own.
@@ -106,6 +109,17 @@ class ActionTables:
         self.pre_action = np.array([number for number, _ in rows], dtype=np.int64)
         self.pre_mask = self.packing.split(cube.mask for _, cube in rows)
         self.pre_value = self.packing.split(cube.value for _, cube in rows)
+        # The literals of each row as numbers: bit b clear is b, bit b set is b behind all of those, and
+        # an empty condition has a literal of its own, which always holds.
+        width = self.packing.words * WORD
+        literals: list[int] = []
+        firsts: list[int] = []
+        for _, cube in rows:
+            firsts.append(len(literals))
+            bits = [bit for bit in range(cube.mask.bit_length()) if cube.mask >> bit & 1]
+            literals.extend([bit + width * (cube.value >> bit & 1) for bit in bits] or [2 * width])
+        self._literal = np.array(literals, dtype=np.int64)
+        self._literal_first = np.array(firsts, dtype=np.int64)
 
     def _compile_outcomes(self) -> None:
         base: list[_Masks] = []
@@ -176,12 +190,7 @@ class ActionTables:
 
     def applicable(self, states: Words) -> tuple[Index, Index]:
         """Pairs of state row and action whose precondition is true, ordered by both."""
-        fits: Flags | None = None
-        for word in range(self.packing.words):
-            part = (states[:, word, None] & self.pre_mask[None, :, word]) == self.pre_value[None, :, word]
-            fits = part if fits is None else fits & part
-        assert fits is not None
-        rows, columns = np.nonzero(fits)
+        rows, columns = self._fitting(states)
         actions = self.pre_action[columns]
         if not self.general and not self.repeats:
             return rows, actions
@@ -193,6 +202,50 @@ class ActionTables:
         total = len(self.task.actions)
         keys = np.unique(np.concatenate(pieces_rows) * total + np.concatenate(pieces_actions))
         return keys // total, keys % total
+
+    def _fitting(self, states: Words) -> tuple[Index, Index]:
+        """Pairs of state row and row of :attr:`pre_action` that fit, ordered by both.
+
+        A precondition is tried only where its rarest literal holds.
+        """
+        if len(states) * len(self.pre_action) <= _FEW_CELLS:
+            state_rows, columns = np.nonzero(self._fits(states, slice(None)))
+            return state_rows, columns
+        bits = self.packing.bit_columns(states)
+        often = bits.sum(axis=1, dtype=np.int64)
+        often = np.concatenate([len(states) - often, often, [len(states)]])[self._literal]
+        rarest = np.minimum.reduceat(often, self._literal_first)
+        owner = np.repeat(np.arange(len(rarest)), np.diff(self._literal_first, append=len(often)))
+        least = np.flatnonzero(often == rarest[owner])
+        least = least[np.unique(owner[least], return_index=True)[1]]
+        pivot = self._literal[least]
+        used = np.flatnonzero(rarest)
+        used = used[np.argsort(pivot[used], kind="stable")]
+        keys = []
+        starts = np.flatnonzero(np.diff(pivot[used], prepend=-1))
+        for group in np.split(used, starts[1:]):
+            if not len(group):
+                continue
+            literal = int(pivot[group[0]])
+            if literal == 2 * len(bits):
+                rows = np.arange(len(states))
+            else:
+                rows = np.flatnonzero(bits[literal % len(bits)] == (literal >= len(bits)))
+            found = np.nonzero(self._fits(states[rows], group))
+            keys.append(rows[found[0]] * len(self.pre_action) + group[found[1]])
+        joined = np.concatenate(keys) if keys else np.empty(0, dtype=np.int64)
+        joined.sort()
+        return np.divmod(joined, max(1, len(self.pre_action)))
+
+    def _fits(self, states: Words, rows: Index | slice) -> Flags:
+        """Which of some rows of :attr:`pre_action` (columns) hold in each state (rows)."""
+        mask, value = self.pre_mask[rows], self.pre_value[rows]
+        fits: Flags | None = None
+        for word in range(self.packing.words):
+            if mask[:, word].any():
+                part = (states[:, word, None] & mask[None, :, word]) == value[None, :, word]
+                fits = part if fits is None else fits & part
+        return np.ones((len(states), len(mask)), dtype=np.bool_) if fits is None else fits
 
     def successors(self, states: Words, rows: Index, outcomes: Index) -> Words:
         """The state after each outcome in the state of each row."""

@@ -75,6 +75,15 @@ class Packing:
         rows = [p.to_bytes(self.words * 8, "little") for p in packed]
         return np.frombuffer(b"".join(rows), dtype="<u8").astype(np.uint64).reshape(len(rows), self.words)
 
+    def bit_columns(self, states: Words) -> npt.NDArray[np.uint8]:
+        """Bits (rows) by state (columns): 0 or 1."""
+        octets = np.ascontiguousarray(states.astype("<u8", copy=False).T).view(np.uint8)
+        by_octet = octets.reshape(self.words, len(states), 8).transpose(0, 2, 1)
+        found: npt.NDArray[np.uint8] = np.empty((self.words, 8, 8, len(states)), dtype=np.uint8)
+        for bit in range(8):
+            np.bitwise_and(by_octet >> bit, 1, out=found[:, :, bit])
+        return found.reshape(self.words * WORD, len(states))
+
     def unpack(self, states: Words) -> npt.NDArray[np.uint8]:
         """The truth value of every variable in each row."""
         octets = np.ascontiguousarray(states.astype("<u8")).view(np.uint8)

@@ -55,17 +55,19 @@ class StateTable:
                 slots[free] = first + rows
                 claimed.append(free)
                 holder = slots[at]
-            same = (self._states[holder] == batch[open_rows]).all(axis=1)
+            same = self._states[holder, 0] == batch[open_rows, 0]
+            for word in range(1, self.words):
+                same &= self._states[holder, word] == batch[open_rows, word]
             found[open_rows[same]] = holder[same]
             open_rows, at = open_rows[~same], (at[~same] + 1) & mask
         new = np.flatnonzero(found == first + np.arange(size))
         if len(new) < size:
-            renumbered = np.empty(first + size, dtype=np.int64)
-            renumbered[:first] = np.arange(first)
-            renumbered[first + new] = first + np.arange(len(new))
-            found = renumbered[found]
+            renumbered = np.empty(size, dtype=np.int64)
+            renumbered[new] = first + np.arange(len(new))
+            inside = np.flatnonzero(found >= first)
+            found[inside] = renumbered[found[inside] - first]
             for free in claimed:
-                slots[free] = renumbered[slots[free]]
+                slots[free] = renumbered[slots[free] - first]
             self._states[first : first + len(new)] = batch[new]
         self.count = first + len(new)
         return found

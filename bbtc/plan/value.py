@@ -99,8 +99,8 @@ def reachability(space: StateSpace, limits: Limits, goal: Flags | None = None) -
     limits.check_time("the search for the best probability")
     graph = Graph(space)
     targets = space.goal if goal is None else goal
-    some = graph.reach(targets).found
-    surely = graph.surely(targets)
+    reached = graph.reach(targets)
+    some, surely = reached.found, graph.surely(targets, reached)
     one, maybe = surely.found, some & ~surely.found
     lower, upper = one.astype(np.float64), some.astype(np.float64)
     best = np.zeros(graph.choices, dtype=np.bool_)

@@ -18,6 +18,8 @@ from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags
 
 Floats = npt.NDArray[np.float64]
+Number = npt.NDArray[np.int32]
+"""Numbers of states or choices."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +28,8 @@ class Reached:
     be in the targets (0 there, -1 where they cannot be reached); ``via[s]`` is the first choice that
     may lead one step closer, -1 where there is none or none is needed."""
 
-    depth: npt.NDArray[np.int32]
-    via: Index
+    depth: Number
+    via: Number
 
     @property
     def found(self) -> Flags:
@@ -43,37 +45,38 @@ class Graph:
         self.states = len(space.states)
         self.choices = len(space.choice_action)
         counts = np.diff(space.choice_first)
-        self.choice_state: Index = np.repeat(np.arange(self.states), counts)
+        self.choice_state: Number = np.repeat(np.arange(self.states, dtype=np.int32), counts)
         """The state of each choice."""
-        self.edge_choice: Index = np.repeat(np.arange(self.choices), np.diff(space.edge_first))
+        self.edge_choice: Number = np.repeat(
+            np.arange(self.choices, dtype=np.int32), np.diff(space.edge_first)
+        )
         """The choice of each edge."""
         order = np.argsort(space.edge_target, kind="stable")
-        self._into: Index = self.edge_choice[order]
+        self._into: Number = self.edge_choice[order]
         counts = np.bincount(space.edge_target, minlength=self.states)
         self._into_first: Index = np.concatenate(([0], np.cumsum(counts)))
 
     def reach(self, targets: Flags, allowed: Flags | None = None) -> Reached:
         """What may reach the targets by allowed choices (all by default)."""
         depth = np.where(targets, 0, -1).astype(np.int32)
-        via = np.full(self.states, -1, dtype=np.int64)
-        frontier = np.flatnonzero(targets)
+        via = np.full(self.states, -1, dtype=np.int32)
+        frontier: Index | Number = np.flatnonzero(targets)
         step = 0
         while len(frontier):
             step += 1
-            choices = self._into[
-                ranges(
-                    self._into_first[frontier], self._into_first[frontier + 1] - self._into_first[frontier]
-                )
-            ]
+            firsts = self._into_first[frontier]
+            choices = self._into[ranges(firsts, self._into_first[frontier + 1] - firsts)]
             if allowed is not None:
                 choices = choices[allowed[choices]]
             choices = choices[depth[self.choice_state[choices]] < 0]
+            choices.sort()
             states = self.choice_state[choices]
-            # The lowest choice of each state wins, whatever the order of the edges.
-            order = np.argsort(choices, kind="stable")[::-1]
-            via[states[order]] = choices[order]
-            depth[states] = step
-            frontier = np.unique(states)
+            # Choices are ordered by state: the lowest of each state stands first.
+            lowest = np.ones(len(states), dtype=np.bool_)
+            np.not_equal(states[1:], states[:-1], out=lowest[1:])
+            frontier = states[lowest]
+            via[frontier] = choices[lowest]
+            depth[frontier] = step
         return Reached(depth, via)
 
     def into(self, states: Flags) -> Flags:
@@ -82,10 +85,10 @@ class Graph:
         hit[self.edge_choice[states[self.space.edge_target]]] = True
         return hit
 
-    def surely(self, targets: Flags) -> Reached:
+    def surely(self, targets: Flags, some: Reached | None = None) -> Reached:
         """Where the targets can be reached with probability 1, with choices that do so and never
-        leave that set."""
-        reached = self.reach(targets)
+        leave that set. ``some`` is what :meth:`reach` finds for the targets, if that is known."""
+        reached = self.reach(targets) if some is None else some
         while True:
             lost = ~reached.found
             safe = ~self.into(lost)
@@ -127,7 +130,7 @@ class Graph:
             staying[self.edge_choice[edges][across]] = False
 
 
-def sums(owners: Index, weights: Floats, count: int) -> Floats:
+def sums(owners: Index | Number, weights: Floats, count: int) -> Floats:
     """For each of ``count`` owners, the sum of its weights."""
     return np.bincount(owners, weights=weights, minlength=count).astype(np.float64, copy=False)
 
