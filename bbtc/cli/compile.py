@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from bbtc.cli.output import write, write_depfile
 from bbtc.cli.session import Session, grounding_limits, output_options
 from bbtc.cli.session import command as session_command
+from bbtc.files import write, write_depfile
 
 
 @click.command("compile")

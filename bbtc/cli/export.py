@@ -6,7 +6,6 @@ from fractions import Fraction
 
 import click
 
-from bbtc.cli.output import write, write_depfile
 from bbtc.cli.session import (
     Probability,
     Session,
@@ -16,6 +15,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.files import write, write_depfile
 from bbtc.plan.strategies import DEFAULT
 
 

@@ -21,8 +21,8 @@ def command(session: Session, files: tuple[str, ...], check: bool) -> None:
     Comments are kept. A file with syntax errors is left as it is, and so is one that has the layout
     already.
     """
-    from bbtc.cli.output import drift, write
     from bbtc.cli.wording import counted
+    from bbtc.files import drift, write
 
     files = tuple(dict.fromkeys(files))
     changed = 0

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import click
 
 from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERRUPTED, EXIT_LIMIT
-from bbtc.cli.output import write, write_depfile
 from bbtc.cli.session import (
     Probability,
     Session,
@@ -23,6 +22,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.files import write, write_depfile
 from bbtc.plan.strategies import DEFAULT
 
 if TYPE_CHECKING:

@@ -1,0 +1,91 @@
+"""Writing: whole files or nothing, unchanged files untouched, drift shown, Make dependencies."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import os
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from bbtc.diagnostics import BbtcError
+
+
+def write(path: str, content: str | bytes, *, check: bool = False) -> bool:
+    """Write an artefact to ``path`` (``-``: stdout); whether anything was written.
+
+    A file is written beside its place and renamed, and left untouched if it has the content
+    already. With ``check`` nothing is written, and a difference raises :class:`BbtcError` with a
+    diff. Raises :class:`BbtcError` if the file cannot be written.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    if path == "-":
+        if not check:
+            sys.stdout.flush()
+            sys.stdout.buffer.write(data)
+            sys.stdout.buffer.flush()
+        return not check
+    try:
+        old = Path(path).read_bytes()
+    except FileNotFoundError:
+        old = None
+    except OSError as error:
+        raise BbtcError.single("BBT0004", f"cannot read {path}: {error.strerror}") from error
+    if old == data:
+        return False
+    if check:
+        raise drift(path, old, data)
+    _replace(path, data)
+    return True
+
+
+def drift(path: str, old: bytes | None, new: bytes) -> BbtcError:
+    """The error that shows how a file (None: there is none) differs from what would be written."""
+    return BbtcError.single("BBT0008", _diff(path, old, new), hint="run the same command without --check")
+
+
+def _replace(path: str, data: bytes) -> None:
+    target = Path(os.path.realpath(path))  # through a symbolic link, not over it
+    temporary = None
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(data)
+        mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()
+        Path(temporary).chmod(mode)
+        Path(temporary).replace(target)
+    except OSError as error:
+        raise BbtcError.single("BBT0004", f"cannot write {path}: {error.strerror}") from error
+    finally:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                Path(temporary).unlink()
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _diff(path: str, old: bytes | None, new: bytes) -> str:
+    if old is None:
+        return f"{path} does not exist"
+    try:
+        before, after = old.decode().splitlines(), new.decode().splitlines()
+    except UnicodeDecodeError:
+        return f"{path} differs from what would be written"
+    diff = "\n".join(difflib.unified_diff(before, after, path, f"{path} (as it would be)", lineterm=""))
+    return f"{path} differs from what would be written:\n{diff}"
+
+
+def write_depfile(path: str, target: str, inputs: Iterable[str]) -> None:
+    """A Make rule that lets ``target`` depend on every input file."""
+    names = " ".join(_make_name(name) for name in inputs if name != "-")
+    write(path, f"{_make_name(target)}: {names}\n")
+
+
+def _make_name(name: str) -> str:
+    return name.replace("\\", "\\\\").replace(" ", "\\ ").replace("#", "\\#").replace("$", "$$")
