@@ -7,7 +7,7 @@ import difflib
 import os
 import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError
@@ -39,6 +39,23 @@ def write(path: str, content: str | bytes, *, check: bool = False) -> bool:
         raise drift(path, old, data)
     _replace(path, data)
     return True
+
+
+def write_files(directory: str, texts: Mapping[str, str], *, check: bool = False) -> None:
+    """Write files, named by relative paths with ``/``, below a directory, which is made where it is
+    missing; other files in it stay. With ``check`` nothing is written, and the first difference
+    raises. Raises :class:`BbtcError` as :func:`write` does, and where ``directory`` is not one."""
+    root = Path(directory)
+    if root.exists() and not root.is_dir():
+        raise BbtcError.single("BBT0004", f"cannot write {directory}: it is not a directory")
+    for name, text in texts.items():
+        target = root.joinpath(*name.split("/"))
+        if not check:
+            try:
+                target.parent.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise BbtcError.single("BBT0004", f"cannot write {target}: {error.strerror}") from error
+        write(str(target), text, check=check)
 
 
 def drift(path: str, old: bytes | None, new: bytes) -> BbtcError:

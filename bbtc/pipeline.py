@@ -10,7 +10,7 @@ from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import Figures, figures, flow
 from bbtc.belief.soundness import violations
 from bbtc.diagnostics import BbtcError, Related, Report, Severity
-from bbtc.export.registry import load_exporter, parse_options
+from bbtc.export.registry import Artefact, load_exporter, parse_options
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
@@ -101,6 +101,19 @@ def compile_sources(
     return ground_model(resolve_model(inputs, report, checks=checks), report, limits)
 
 
+def task_of_sources(sources: Sequence[SourceFile], report: Report, limits: Limits) -> Task:
+    """The task that files hold: one compiled task as JSON, or a domain and a problem. What is
+    doubtful in the latter goes to the report. Raises :class:`BbtcError` or ``LimitReached``."""
+    from bbtc.artefacts import load_task
+    from bbtc.artefacts.kinds import is_artefact
+
+    if not is_artefact(sources[0]):
+        return compile_sources(sources, report, limits, checks=True)
+    if len(sources) > 1:
+        raise BbtcError.single("BBT0006", "a compiled task stands alone", hint="leave the other file out")
+    return load_task(sources[0])
+
+
 def ground_model(model: Model, report: Report, limits: Limits) -> Task:
     """The ground task of a model with a problem. Raises :class:`BbtcError`."""
     from bbtc.ground.instantiate import ground
@@ -142,7 +155,7 @@ def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
     return figures(tree.task, tree.root, chain), chain
 
 
-def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limits) -> str | bytes:
+def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limits) -> Artefact:
     """The tree in an export format. Raises :class:`BbtcError` for an unknown format or option and
     for a tree the format cannot hold."""
     exporter = load_exporter(form)

@@ -2,36 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
-from typing_extensions import assert_never
+from collections.abc import Mapping
 
 from bbtc.artefacts.cursor import At, clip, nearest
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.task import Variable
+from bbtc.ground.describe import condition_as_lists
 from bbtc.kleene import Truth
 
 MAX_DEPTH = 100
 """Levels of ``and``, ``or`` and ``not`` a condition may have in an artefact."""
 
 
-def condition_to_json(condition: Condition, variables: Sequence[Variable]) -> list[object]:
-    """The condition with its variables by name."""
-    match condition:
-        case Is(variable, value):
-            return ["is", variables[variable].name, value.word]
-        case Known(variable):
-            return ["known", variables[variable].name]
-        case And(parts):
-            return ["and", *(condition_to_json(part, variables) for part in parts)]
-        case Or(parts):
-            return ["or", *(condition_to_json(part, variables) for part in parts)]
-        case Not(part):
-            return ["not", condition_to_json(part, variables)]
-        case Constant(value):
-            return [Truth.of(value).word]
-        case _:
-            assert_never(condition)
+condition_to_json = condition_as_lists
 
 
 def condition_from_json(at: At, index: Mapping[str, int], depth: int = 0) -> Condition:

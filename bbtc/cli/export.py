@@ -15,7 +15,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
-from bbtc.files import write, write_depfile
+from bbtc.files import write, write_depfile, write_files
 from bbtc.plan.strategies import DEFAULT
 
 
@@ -67,10 +67,12 @@ def command(
     """Write TREE in FORMAT. With a DOMAIN and PROBLEM in its place, plan on the way."""
     from bbtc.cli.inputs import is_artefact, is_tree, task_of, tree_of
     from bbtc.cli.plan import STATUS_EXIT, run_planner
-    from bbtc.export.registry import load_exporter
+    from bbtc.export.registry import Files, load_exporter
     from bbtc.pipeline import export_tree
 
-    load_exporter(form)  # an unknown format is reported before any work
+    # What cannot be is reported before any work.
+    if not load_exporter(form).suffix and output == "-":
+        raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
     limits = session.limits
     sources = [session.read(file) for file in files]
     status = 0
@@ -80,7 +82,11 @@ def command(
         plan = run_planner(session, task_of(session, sources, limits), target, strategy, limits, quiet=True)
         tree, status = plan.tree, STATUS_EXIT[plan.tree.status]
     pairs = dict(_pair(option) for option in options)
-    write(output, export_tree(tree, form, pairs, limits), check=check)
+    artefact = export_tree(tree, form, pairs, limits)
+    if isinstance(artefact, Files):
+        write_files(output, artefact.texts, check=check)
+    else:
+        write(output, artefact, check=check)
     if depfile is not None:
         write_depfile(depfile, output, session.inputs)
     return status

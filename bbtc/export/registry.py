@@ -31,6 +31,18 @@ Figures: TypeAlias = Mapping[str, Fraction]
 
 
 @dataclass(frozen=True, slots=True)
+class Files:
+    """An artefact of several files, such as a project: relative paths with ``/`` and their texts,
+    in the order they are written. It goes into a directory."""
+
+    texts: Mapping[str, str]
+
+
+Artefact: TypeAlias = str | bytes | Files
+"""What an exporter makes: text, bytes for a binary format, or files for a directory."""
+
+
+@dataclass(frozen=True, slots=True)
 class Option:
     """A declared option of an exporter. The type of ``default`` (bool, int or str) is the type of
     the option; a str option with ``choices`` takes only those."""
@@ -43,7 +55,8 @@ class Option:
 
 @runtime_checkable
 class Exporter(Protocol):
-    """A back-end. ``description`` is one line; ``suffix`` is that of its files, with the dot."""
+    """A back-end. ``description`` is one line; ``suffix`` is that of its files, with the dot, empty
+    for a directory."""
 
     @property
     def name(self) -> str: ...
@@ -57,9 +70,9 @@ class Exporter(Protocol):
     @property
     def options(self) -> tuple[Option, ...]: ...
 
-    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str | bytes:
-        """The artefact: text, or bytes for a binary format. ``options`` holds a value for every
-        declared option. Deterministic. Raises :class:`BbtcError` for a tree it cannot write."""
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> Artefact:
+        """The artefact. ``options`` holds a value for every declared option. Deterministic. Raises
+        :class:`BbtcError` for a tree it cannot write."""
         ...
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from typing_extensions import assert_never
 
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.task import Task
+from bbtc.ground.task import Task, Variable
 from bbtc.kleene import Truth
 
 
@@ -29,5 +31,25 @@ def describe(task: Task, condition: Condition) -> str:
             return f"not {describe(task, part)}"
         case Constant(value):
             return Truth.of(value).word
+        case _:
+            assert_never(condition)
+
+
+def condition_as_lists(condition: Condition, variables: Sequence[Variable]) -> list[object]:
+    """``["is", "seen(soda)", "true"]``, ``["and", …]``: the condition as nested lists of words,
+    which is its form in artefacts."""
+    match condition:
+        case Is(variable, value):
+            return ["is", variables[variable].name, value.word]
+        case Known(variable):
+            return ["known", variables[variable].name]
+        case And(parts):
+            return ["and", *(condition_as_lists(part, variables) for part in parts)]
+        case Or(parts):
+            return ["or", *(condition_as_lists(part, variables) for part in parts)]
+        case Not(part):
+            return ["not", condition_as_lists(part, variables)]
+        case Constant(value):
+            return [Truth.of(value).word]
         case _:
             assert_never(condition)
