@@ -11,7 +11,7 @@ from typing_extensions import assert_never
 from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax import ast
-from bbtc.syntax.layout import Doc, Setter
+from bbtc.syntax.layout import Doc, Setter, has_empty_lines
 from bbtc.syntax.scan import without_comments
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
@@ -22,7 +22,7 @@ def print_document(document: ast.Document) -> str:
     docs = _Docs(without_comments(document.source.text))
     whole = Span(document.source, 0, len(document.source.text) + 1)
     definitions = tuple(docs.definition(definition) for definition in document.definitions)
-    return Setter(document.comments).run(Doc("", definitions, span=whole, broken=True))
+    return Setter(document.comments).run(Doc("", definitions, span=whole, broken=True, airy=True))
 
 
 def print_formula(formula: ast.Formula) -> str:
@@ -62,16 +62,17 @@ class _Docs:
         head_span = self._parentheses(node.span.start + 1, node.name.span.end, node.span)
         head = Doc(f"({node.kind}", (name,), ")", head_span, glued=1)
         sections = tuple(self.section(section) for section in node.sections)
-        return Doc("(define", (head, *sections), ")", node.span, glued=1, broken=True, spaced=True)
+        return Doc("(define", (head, *sections), ")", node.span, 1, broken=True, spaced=True, airy=True)
 
     def section(self, node: ast.Section) -> Doc:
         match node:
             case ast.Requirements():
-                return Doc("(:requirements", tuple(map(_leaf, node.keys)), ")", node.span, filled=True)
+                keys = tuple(map(_leaf, node.keys))
+                return Doc("(:requirements", keys, ")", node.span, filled=True, hanging=True)
             case ast.TypedSection():
-                return Doc(f"(:{node.kind}", self.groups(node.entries), ")", node.span)
+                return self.listed(f"(:{node.kind}", self.groups(node.entries), node, apart=True)
             case ast.Predicates():
-                return self.listed("(:predicates", map(self.predicate, node.declarations), node)
+                return self.listed("(:predicates", map(self.predicate, node.declarations), node, apart=True)
             case ast.Functions():
                 return self.listed("(:functions", map(self.function, node.declarations), node)
             case ast.Action() | ast.Template() | ast.Sensor():
@@ -83,7 +84,7 @@ class _Docs:
             case ast.Init():
                 return self.listed("(:init", map(self.initial, node.elements), node)
             case ast.Hidden():
-                return Doc("(:hidden", tuple(map(self.initial, node.facts)), ")", node.span)
+                return self.listed("(:hidden", map(self.initial, node.facts), node)
             case ast.Goal():
                 return Doc("(:goal", (self.formula(node.formula),), ")", node.span, glued=1)
             case ast.GoalNumber():
@@ -99,16 +100,18 @@ class _Docs:
     def observed(self, content: ast.Formula | ast.Probabilistic) -> Doc:
         return self.effect(content) if isinstance(content, ast.Probabilistic) else self.formula(content)
 
-    def listed(self, head: str, items: Iterable[Doc], node: ast.Predicates | ast.Functions | ast.Init) -> Doc:
-        """A section that is a list: one item a line, if there are several."""
+    def listed(self, head: str, items: Iterable[Doc], node: ast.Section, *, apart: bool = False) -> Doc:
+        """A section that is a list. Declarations stand ``apart``, each on its line; facts on one line if
+        they fit and no empty line groups them, or else as the author arranged them in rows."""
         parts = tuple(items)
-        return Doc(head, parts, ")", node.span, broken=len(parts) > 1)
+        broken = len(parts) > 1 and (apart or has_empty_lines(parts))
+        return Doc(head, parts, ")", node.span, broken=broken, airy=True, rows=not apart)
 
     def schema(self, node: ast.Action | ast.Template | ast.Sensor) -> Doc:
         """An action, a template or a sensor: name, parameters, and the fields that are given."""
         after, span = node.name.span.end, node.span
         fields: list[Doc] = []
-        if node.parameters or isinstance(node, ast.Action):
+        if node.parameters or self._word(":parameters", after, span):
             fields.append(self.parameters(node.parameters, after, span, ":parameters"))
         for word, value in _fields(node):
             match value:
@@ -142,13 +145,13 @@ class _Docs:
             rest = re.compile(r"\s*").match(self._text, after)
             start = rest.end() if rest else after
             here = span._replace(start=start, end=start)
-            return Doc(f"{word} (", self.groups(entries), ")", here, glued=1, filled=True)
+            return Doc(f"{word} (", self.groups(entries), ")", here, glued=1, filled=True, hanging=True)
         start = place.end if place else after
         last = entries[-1].span.end if entries else start
         around = self._parentheses(start, last, span)
         whole = Span(span.source, place.start, around.end) if place and around else around
         opening = f"{word} (" if word else "("
-        return Doc(opening, self.groups(entries), ")", whole, glued=1, filled=True)
+        return Doc(opening, self.groups(entries), ")", whole, glued=1, filled=True, hanging=True)
 
     def derived(self, node: ast.Derived) -> Doc:
         condition = self.formula(node.condition)
@@ -217,6 +220,9 @@ class _Docs:
                 return self.formula(node.formula)
             case ast.Invariant():
                 return Doc("(invariant", tuple(map(self.formula, node.parts)), ")", node.span)
+            case ast.OneOf(parts) if all(isinstance(part, ast.Assign) for part in parts):
+                # Files list hundreds of these: where something is.
+                return Doc("(oneof", tuple(map(self.effect, parts)), ")", node.span, rows=True)
             case (
                 ast.Assign()
                 | ast.EffectForall()
@@ -246,8 +252,8 @@ class _Docs:
             case ast.Or():
                 return Doc("(or", tuple(map(self.formula, node.parts)), ")", node.span)
             case ast.Imply():
-                parts = (self.formula(node.premise), self.formula(node.conclusion))
-                return Doc("(imply", parts, ")", node.span)
+                sides = (self.formula(node.premise), self.formula(node.conclusion))
+                return Doc("(imply", sides, ")", node.span, glued=1)
             case ast.Quantified():
                 typed = self.parameters(node.parameters, node.span.start + 1, node.span)
                 return Doc(f"({node.kind}", (typed, self.formula(node.part)), ")", node.span, glued=1)
@@ -280,9 +286,11 @@ class _Docs:
                 typed = self.parameters(node.parameters, node.span.start + 1, node.span)
                 return Doc("(forall", (typed, self.effect(node.effect)), ")", node.span, glued=1)
             case ast.Probabilistic():
-                return Doc("(probabilistic", tuple(map(self.branch, node.branches)), ")", node.span)
+                branches = tuple(map(self.branch, node.branches))
+                return Doc("(probabilistic", branches, ")", node.span, broken=len(branches) > 1)
             case ast.OneOf():
-                return Doc("(oneof", tuple(map(self.effect, node.parts)), ")", node.span)
+                parts = tuple(map(self.effect, node.parts))
+                return Doc("(oneof", parts, ")", node.span, broken=len(parts) > 1)
             case ast.FluentEffect():
                 parts = (self.fluent(node.fluent), self.expression(node.amount))
                 return Doc(f"({node.operator}", parts, ")", node.span, glued=1)

@@ -2,12 +2,14 @@
 ; patrolled. The robot knows which it is, but the plan has to be made before.
 (define (problem after-a-shift)
   (:domain charging)
-  (:objects station - dock
-            lobby - room)
-  (:init (at station)
-         (probabilistic
-           0.7 (battery half)
-           0.3 (battery low)))
+  (:objects
+    station - dock
+    lobby - room)
+  (:init
+    (at station)
+    (probabilistic
+      0.7 (battery half)
+      0.3 (battery low)))
   (:goal (patrolled lobby))
   (:goal-probability 0.95)
   (:goal-reward 50)

@@ -1,10 +1,11 @@
 ; A security robot patrols rooms and goes back to its dock when the battery is low. Docking may miss
 ; the contacts, and whether current flows is only known after a look at the charger.
 (define (domain charging)
-  (:requirements :typing :negative-preconditions :equality :conditional-effects
-                 :universal-effects :existential-preconditions :probabilistic-effects :rewards :unknown)
-  (:types dock room - place
-          place level - object)
+  (:requirements :typing :negative-preconditions :equality :conditional-effects :universal-effects
+                 :existential-preconditions :probabilistic-effects :rewards :unknown)
+  (:types
+    dock room - place
+    place level - object)
   (:constants full half low - level)
 
   (:predicates
@@ -34,8 +35,7 @@
   (:action return_to_dock
     :parameters (?dock - dock)
     :precondition (not (at ?dock))
-    :effect (probabilistic
-      0.95 (and (at ?dock) (forall (?room - room) (not (at ?room))))))
+    :effect (probabilistic 0.95 (and (at ?dock) (forall (?room - room) (not (at ?room))))))
 
   (:action dock
     :parameters (?dock - dock)

@@ -2,9 +2,10 @@
 ; cannot be handed over goes to the reception, but fragile things only while it is staffed.
 (define (domain delivery)
   (:requirements :adl :probabilistic-effects :unknown :templates)
-  (:types letter parcel - thing
-          desk front_desk - room
-          thing room person - object)
+  (:types
+    letter parcel - thing
+    desk front_desk - room
+    thing room person - object)
   (:constants reception - front_desk)
 
   (:predicates
@@ -50,15 +51,11 @@
       (sits_at ?to ?desk)
       (at ?desk)
       (present ?to))
-    :effect (probabilistic
-      0.98 (and (handed ?thing ?to) (not (carrying ?thing)))))
+    :effect (probabilistic 0.98 (and (handed ?thing ?to) (not (carrying ?thing)))))
 
   (:action leave
     :parameters (?thing - (either letter parcel) ?room - front_desk)
-    :precondition (and
-      (carrying ?thing)
-      (at ?room)
-      (imply (fragile ?thing) (staffed ?room)))
+    :precondition (and (carrying ?thing) (at ?room) (imply (fragile ?thing) (staffed ?room)))
     :effect (probabilistic            ; the flap of the tray sticks at times
       9/10 (and (left ?thing ?room) (not (carrying ?thing)))))
 

@@ -33,15 +33,13 @@
       (holding ?key)
       (in ?from)
       (exists (?to - room) (or (joins ?door ?from ?to) (joins ?door ?to ?from))))
-    :effect (probabilistic
-      9/10 (and (open ?door) (not (locked ?door)))))
+    :effect (probabilistic 9/10 (and (open ?door) (not (locked ?door)))))
 
   ; Somebody in the control room opens the door from afar, if somebody is there: one time in three.
   (:action call_control_room
     :parameters (?door - door)
     :precondition (locked ?door)
-    :effect (probabilistic
-      1/3 (and (open ?door) (not (locked ?door)))))
+    :effect (probabilistic 1/3 (and (open ?door) (not (locked ?door)))))
 
   (:action take_key
     :parameters (?key - key ?room - room)

@@ -50,8 +50,7 @@
     :effect (probabilistic
       0.8 (seen ?item)
       0.2 (not (seen ?item)))
-    :body (fallback
-      (foreach (?place - place) (find_in ?item ?place))))
+    :body (fallback (foreach (?place - place) (find_in ?item ?place))))
 
   ; --- grasping: where current and future uncertainty meet ----------------------------------
 

@@ -1,11 +1,12 @@
 ; A tracked robot inspects the valves and gauges of a pump house. Its camera needs light: the lamps of
 ; the area, which may be broken, or its own torch, which costs battery.
 (define (domain inspection)
-  (:requirements :typing :negative-preconditions :disjunctive-preconditions :existential-preconditions
-                 :universal-preconditions :conditional-effects :universal-effects
-                 :probabilistic-effects :action-costs :unknown)
-  (:types valve gauge - asset
-          area asset - object)
+  (:requirements :typing :negative-preconditions :disjunctive-preconditions
+                 :existential-preconditions :universal-preconditions :conditional-effects
+                 :universal-effects :probabilistic-effects :action-costs :unknown)
+  (:types
+    valve gauge - asset
+    area asset - object)
   (:constants pump_hall - area)
 
   (:predicates
@@ -49,9 +50,13 @@
       (or (lit ?area) (torch_on)))
     :effect (and
       (when (lens_clean)
-        (probabilistic 2/3 (closed ?valve) 1/3 (not (closed ?valve))))
+        (probabilistic
+          2/3 (closed ?valve)
+          1/3 (not (closed ?valve))))
       (when (not (lens_clean))       ; one picture in four is useless: closed stays unknown
-        (probabilistic 1/2 (closed ?valve) 1/4 (not (closed ?valve))))
+        (probabilistic
+          1/2 (closed ?valve)
+          1/4 (not (closed ?valve))))
       (increase (total-cost) 1)))
 
   (:action read_gauge
@@ -63,7 +68,9 @@
       (or (lit ?area) (torch_on))
       (lens_clean))
     :effect (and
-      (probabilistic 0.95 (in_range ?gauge) 0.05 (not (in_range ?gauge)))
+      (probabilistic
+        0.95 (in_range ?gauge)
+        0.05 (not (in_range ?gauge)))
       (increase (total-cost) 1)))
 
   (:action turn_valve
@@ -74,7 +81,9 @@
       (located ?valve ?area)
       (at ?area))
     :effect (and
-      (probabilistic 0.7 (closed ?valve) 0.05 (jammed ?valve))
+      (probabilistic
+        0.7 (closed ?valve)
+        0.05 (jammed ?valve))
       (increase (total-cost) 4)))
 
   ; Vibration pads shake a jammed valve loose, now and then.

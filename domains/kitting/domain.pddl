@@ -2,9 +2,10 @@
 ; until the force sensor is read, and an item that slips may roll out of view.
 (define (domain kitting)
   (:requirements :typing :negative-preconditions :probabilistic-effects :unknown :templates)
-  (:types bottle box screwdriver - item
-          tray crate - container
-          item container - object)
+  (:types
+    bottle box screwdriver - item
+    tray crate - container
+    item container - object)
 
   (:predicates
     (in_view ?item - item)

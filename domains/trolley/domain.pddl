@@ -21,8 +21,7 @@
       (trolley_at ?to)
       (forall (?tray - tray)
         (when (and (on ?tray) (not (strapped ?tray)))
-          (probabilistic
-            1/10 (and (not (on ?tray)) (probabilistic 1/4 (spilled ?tray))))))))
+          (probabilistic 1/10 (and (not (on ?tray)) (probabilistic 1/4 (spilled ?tray))))))))
 
   (:action strap
     :parameters (?tray - tray)

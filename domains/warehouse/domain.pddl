@@ -2,10 +2,12 @@
 ; blocked by pallets, and what stands on a shelf is known only after a scan of its barcode.
 (define (domain warehouse)
   (:requirements :typing :negative-preconditions :equality :disjunctive-preconditions
-                 :existential-preconditions :derived-predicates :conditional-effects :universal-effects
-                 :action-costs :probabilistic-effects :non-deterministic :unknown :templates)
-  (:types shelf station - spot
-          spot item - object)
+                 :existential-preconditions :derived-predicates :conditional-effects
+                 :universal-effects :action-costs :probabilistic-effects :non-deterministic :unknown
+                 :templates)
+  (:types
+    shelf station - spot
+    spot item - object)
 
   (:predicates
     (at ?spot - spot)
@@ -21,13 +23,15 @@
 
   ; An aisle works both ways unless a pallet stands in it.
   (:derived (clear ?from ?to - spot)
-    (and (or (aisle ?from ?to) (aisle ?to ?from))
-         (not (blocked ?from ?to))
-         (not (blocked ?to ?from))))
+    (and
+      (or (aisle ?from ?to) (aisle ?to ?from))
+      (not (blocked ?from ?to))
+      (not (blocked ?to ?from))))
 
   (:derived (reachable ?spot - spot)
-    (or (at ?spot)
-        (exists (?near - spot) (and (reachable ?near) (clear ?near ?spot)))))
+    (or
+      (at ?spot)
+      (exists (?near - spot) (and (reachable ?near) (clear ?near ?spot)))))
 
   ; The fleet manager plans the way; the robot only needs some way to be free.
   (:action drive
@@ -67,7 +71,9 @@
     :parameters (?item - item ?station - station)
     :precondition (and (loaded ?item) (at ?station))
     :effect (and
-      (oneof (and (delivered ?item) (not (loaded ?item))) ())
+      (oneof
+        (and (delivered ?item) (not (loaded ?item)))
+        ())
       (increase (total-cost) 1)))
 
   ; One shelf: go there, scan while it is not known whether the item is on it, and fetch it.
@@ -88,5 +94,4 @@
       (not (loaded ?item))
       (exists (?shelf - shelf) (unknown (stored ?item ?shelf))))
     :effect (probabilistic 0.85 (loaded ?item))
-    :body (fallback
-      (foreach (?shelf - shelf) (search_shelf ?item ?shelf)))))
+    :body (fallback (foreach (?shelf - shelf) (search_shelf ?item ?shelf)))))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from bbtc.diagnostics import Report
@@ -26,7 +28,6 @@ PAIRS = {
 (define (domain D)
 
   (:action Go
-    :parameters ()
     :effect (and (P A) (not (Q)))))
 """,
     ),
@@ -36,9 +37,10 @@ PAIRS = {
 (define (domain d)
 
   (:action a
-    :parameters ()
     :precondition (p)
-    :effect (probabilistic .5 (q) .5 (increase (reward) 1))))
+    :effect (probabilistic
+      .5 (q)
+      .5 (increase (reward) 1))))
 """,
     ),
     "long forms break by items": (
@@ -48,13 +50,11 @@ PAIRS = {
         """\
 (define (problem p)
   (:domain d)
-  (:init
-    (p a)
-    (q b))
+  (:init (p a) (q b))
   (:goal (and
-      (first-condition of-some-length with-objects)
-      (second-condition of-some-length)
-      (third-condition))))
+    (first-condition of-some-length with-objects)
+    (second-condition of-some-length)
+    (third-condition))))
 """,
     ),
     "comments stay where they are": (
@@ -92,7 +92,6 @@ PAIRS = {
 
   ; about the action
   (:action a ; its name
-    :parameters ()
     :precondition ; before the value
     (and
       (p) ; one
@@ -105,6 +104,131 @@ PAIRS = {
   ; last
 )
 ; after it
+""",
+    ),
+    "comments in a column keep it, and move right together where code is longer": (
+        """\
+(define (domain d) (:predicates (p)      ; one
+  (quite-long ?x)   ; two
+                        (q))    ; three
+  (:constants a b - t   ; a table
+              c - u)) ; not in a column
+""",
+        """\
+(define (domain d)
+  (:predicates
+    (p)                                  ; one
+    (quite-long ?x) ; two
+    (q))                        ; three
+  (:constants
+    a b - t             ; a table
+    c - u)) ; not in a column
+""",
+    ),
+    "a column is shared": (
+        """\
+(define (domain d) (:predicates
+ (p)        ; one
+ (qqqqqqqq) ; two
+ (r)        ; three
+))
+""",
+        """\
+(define (domain d)
+  (:predicates
+    (p)        ; one
+    (qqqqqqqq) ; two
+    (r)        ; three
+  ))
+""",
+    ),
+    "declarations stand on lines of their own, with the empty lines between them": (
+        """(define (domain d) (:types a b - c c e - object) (:predicates
+
+        (p) (q)
+
+
+        (r)))""",
+        """\
+(define (domain d)
+  (:types
+    a b - c
+    c e - object)
+  (:predicates
+    (p)
+    (q)
+
+    (r)))
+""",
+    ),
+    "facts keep their rows where they do not fit on a line": (
+        """(define (problem p) (:domain d) (:init (at a) (next a b)
+        (next b c) (next c d)
+        (wet a) (wet b) (wet c) (wet d) (unknown (dry a)) (unknown (dry b))
+
+        (oneof (gold a) (gold b))) (:goal
+        (and (wet a)
+        (wet b))))""",
+        """\
+(define (problem p)
+  (:domain d)
+  (:init
+    (at a) (next a b)
+    (next b c) (next c d)
+    (wet a) (wet b) (wet c) (wet d) (unknown (dry a)) (unknown (dry b))
+
+    (oneof (gold a) (gold b)))
+  (:goal (and (wet a) (wet b))))
+""",
+    ),
+    "facts in one long row get a line each": (
+        "(define (problem p) (:domain d) (:init "
+        + " ".join(f"(at thing-{n} place-{n})" for n in range(5))
+        + ") (:goal (p)))",
+        """\
+(define (problem p)
+  (:domain d)
+  (:init
+    (at thing-0 place-0)
+    (at thing-1 place-1)
+    (at thing-2 place-2)
+    (at thing-3 place-3)
+    (at thing-4 place-4))
+  (:goal (p)))
+""",
+    ),
+    "requirements and parameters continue below the first": (
+        "(define (domain d) (:requirements "
+        + " ".join(f":requirement-{n}" for n in range(7))
+        + ") (:action a :parameters ("
+        + " ".join(f"?parameter-{n} - kind-{n}" for n in range(5))
+        + ")))",
+        """\
+(define (domain d)
+  (:requirements :requirement-0 :requirement-1 :requirement-2 :requirement-3 :requirement-4
+                 :requirement-5 :requirement-6)
+
+  (:action a
+    :parameters (?parameter-0 - kind-0 ?parameter-1 - kind-1 ?parameter-2 - kind-2
+                 ?parameter-3 - kind-3 ?parameter-4 - kind-4)))
+""",
+    ),
+    "draws have a line for each branch": (
+        """(define (domain d) (:action a :parameters () :effect (and (oneof (p) ()) (when (p)
+        (probabilistic 1/2 (q) 1/4 (probabilistic 1/3 (p)))))))""",
+        """\
+(define (domain d)
+
+  (:action a
+    :parameters ()
+    :effect (and
+      (oneof
+        (p)
+        ())
+      (when (p)
+        (probabilistic
+          1/2 (q)
+          1/4 (probabilistic 1/3 (p)))))))
 """,
     ),
     "fields keep their order": (
@@ -178,3 +302,12 @@ def test_a_document_without_definitions_is_its_comments() -> None:
     report = Report()
     document = parse(SourceFile("test.pddl", "; one\n\n; two"), report)
     assert print_document(document) == "; one\n\n; two\n"
+
+
+def test_the_domains_have_their_layout(repository: Path) -> None:
+    files = sorted((repository / "domains").glob("*/*.pddl"))
+    assert files
+    texts = {file.relative_to(repository).as_posix(): file.read_text("utf-8") for file in files}
+    assert [name for name, text in texts.items() if print_document(_parse(text)) != text] == [], (
+        "run `bbtc fmt domains/*/*.pddl`"
+    )
