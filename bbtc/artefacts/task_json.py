@@ -36,6 +36,7 @@ from bbtc.ground.task import (
     Task,
     Variable,
     ground_name,
+    split_name,
 )
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile
@@ -86,7 +87,7 @@ def task_to_json(task: Task) -> Json:
 
 def _variable_to_json(variable: Variable) -> Json:
     value: Json = {"name": variable.name}
-    if _split(variable.name) != (variable.predicate, variable.args):
+    if split_name(variable.name) != (variable.predicate, variable.args):
         value |= {"predicate": variable.predicate, "args": list(variable.args)}
     return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
 
@@ -163,13 +164,6 @@ def _body_to_json(body: Body, variables: Sequence[Variable]) -> Json:
             return {"type": "template", "template": template}
         case _:
             assert_never(body)
-
-
-def _split(name: str) -> tuple[str, tuple[str, ...]]:
-    """Symbol and arguments of a ground name, as far as the name alone tells."""
-    symbol, _, rest = name.partition("(")
-    inner = rest.removesuffix(")")
-    return symbol, tuple(inner.split(",")) if inner else ()
 
 
 # --- in --------------------------------------------------------------------------------------
@@ -280,7 +274,7 @@ def _variable(at: At) -> Variable:
         at.members(["predicate", "args"], list(members))  # both or neither
         predicate, args = members["predicate"].string(), _strings(members["args"])
     else:
-        predicate, args = _split(name)
+        predicate, args = split_name(name)
     _check_name(members["name"], predicate, args)
     values = [element.word("true", "false", "unknown") for element in members["values"].elements()]
     if sorted(values) not in (["false", "true"], ["false", "true", "unknown"]):

@@ -1,66 +1,33 @@
-"""Exporter ``btcpp``: BehaviorTree.CPP v4 XML (4.6 and later) from the engine's own nodes.
+"""Exporter ``btcpp``: BehaviorTree.CPP v4 XML (4.6 and later).
 
-A Skipper is a Parallel that ends with its first child to end; an action stands in a BehaviorTree per
-schema that keeps its latch; conditions are leaves that return RUNNING for unknown. docs/export-btcpp.md
-explains every idiom.
+Templates, action schemas and tests of knowledge have BehaviorTrees of their own; conditions are leaves
+that return RUNNING for unknown. docs/export-btcpp.md explains every idiom.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TypeAlias
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from xml.etree.ElementTree import Comment, Element, SubElement, tostring
 
 from typing_extensions import assert_never
 
-from bbtc.export.btcpp_conditions import ConditionWriter, control, is_numeric
-from bbtc.export.interface import Interface, Leaf, action_symbol, guard_of, interface_of
-from bbtc.export.names import Namer, Symbol, camel, identifiers, port_values, printable
+from bbtc.export.btcpp_conditions import ConditionWriter
+from bbtc.export.btcpp_idioms import SKIPPER_LABEL, Idioms, Profile
+from bbtc.export.btcpp_names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
+from bbtc.export.btcpp_notes import notes, template_label
+from bbtc.export.btcpp_options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
+from bbtc.export.btcpp_palette import node_model
+from bbtc.export.interface import action_symbol, guard_of, variable_symbol
 from bbtc.export.registry import Figures, Option, OptionValue
-from bbtc.export.shape import fit, normal, words_of
-from bbtc.ground.condition import Condition
-from bbtc.ground.task import GroundAction, Task
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
+from bbtc.export.shape import fit, written
+from bbtc.ground.condition import TRUE, And, Condition, Or, variables
+from bbtc.ground.task import GroundAction, Task, ground_name, split_name
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 
 ENGINE = "BehaviorTree.CPP"
 _DEEPEST_XML = 120  # levels of a BehaviorTree before a subtree gets one of its own; the engine takes 256
-
-RESERVED = frozenset(
-    """
-    AlwaysFailure AlwaysSuccess AsyncFallback AsyncSequence Delay Fallback ForceFailure ForceSuccess
-    IfThenElse Inverter KeepRunningUntilFailure LoopBool LoopDouble LoopInt LoopString Parallel
-    ParallelAll Precondition ReactiveFallback ReactiveSequence Repeat RetryUntilSuccessful
-    RetryUntilSuccesful RunOnce Script ScriptCondition Sequence SequenceStar SequenceWithMemory
-    SetBlackboard SkipUnlessUpdated Sleep SubTree SubTreePlus Switch2 Switch3 Switch4 Switch5 Switch6
-    Timeout TryCatch UnsetBlackboard WaitValueUpdate WasEntryUpdated WhileDoElse EntryUpdated
-    ConsumeQueue PopFromQueue QueueSize ManualSelector TestNode Root BehaviorTree TreeNodesModel Include
-    Action Condition Control Decorator
-    """.split()  # noqa: SIM905 (a list of seventy lines would be no clearer)
-)
-"""Ids with a meaning of their own in BehaviorTree.CPP 4 files."""
-
-Guard: TypeAlias = bytes
-"""The XML of a guard, which tells guards apart."""
-
-
-@dataclass(frozen=True, slots=True)
-class BtcppNames:
-    """Which identifier stands for what in an exported file: ids of leaves, and object names as
-    values of ports."""
-
-    interface: Interface
-    ids: Mapping[Symbol, str]
-    values: Mapping[str, str]
-
-
-def btcpp_names(tree: Tree) -> BtcppNames:
-    """The names used in the export of a tree."""
-    task = tree.task
-    interface = interface_of(task, tree.root)
-    arguments = [arg for variable in task.variables for arg in variable.args]
-    arguments += [arg for action in task.actions for arg in action.args]
-    return BtcppNames(interface, identifiers(interface.leaves, "camel", RESERVED), port_values(arguments))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,285 +35,239 @@ class BtcppExporter:
     """Writes a tree as BehaviorTree.CPP v4 XML."""
 
     name: str = "btcpp"
-    description: str = "BehaviorTree.CPP v4 XML with its TreeNodesModel, from stock nodes"
+    description: str = "BehaviorTree.CPP v4 XML with its TreeNodesModel"
     suffix: str = ".xml"
     options: tuple[Option, ...] = (
+        NODES,
+        NAMESPACE,
         Option("model", True, "append the TreeNodesModel, which editors such as Groot2 read"),
+        Option("notes", True, "append the comment from which `bbtc import` reads the very same tree"),
     )
 
     def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
-        """The XML. Raises :class:`BbtcError` (BBT0705) for a tree that is too deep."""
+        """The XML. Raises :class:`BbtcError` for a tree that is too deep (BBT0705) and for a namespace
+        that is none (BBT0704)."""
         del figures  # a file that runs has no place for them
-        root = _Writer(tree).document(model=bool(options.get("model", True)))
-        indent(root, "  ")
-        text: str = tostring(root, encoding="unicode", short_empty_elements=True)
-        return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+        namespace = namespace_of(self.name, options)
+        writer = _Writer(tree, profile_of(options), namespace)
+        document = writer.document(bool(options.get("model", True)), bool(options.get("notes", True)))
+        return xml_text(document)
 
 
 btcpp = BtcppExporter()
 
 
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where in a BehaviorTree the writer is: how deep, below which retry nodes, and which objects are
+    ports there."""
+
+    tree_title: str
+    level: int = 0
+    counters: tuple[str, ...] = ()
+    binding: Mapping[str, str] = field(default_factory=dict)
+    labels: Labels = field(default_factory=Labels)
+    template: Node | None = None
+
+    def down(self) -> _Place:
+        """One level further down."""
+        return replace(self, level=self.level + 1)
+
+
 class _Writer:
     """Writes one document: BehaviorTrees are collected while the main tree is written."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, profile: Profile, namespace: str) -> None:
         self.tree = tree
         self.task: Task = tree.task
-        self.names = btcpp_names(tree)
-        self.tree_ids = Namer({*RESERVED, *self.names.ids.values()})
-        self.hoisted: list[Element] = []
-        self.action_trees: dict[tuple[str, bytes, Guard | None], Element] = {}
-        self.condition_trees: dict[Condition, Element] = {}
+        self.names = btcpp_names(tree, namespace)
+        self.profile: Profile = profile
+        self.idioms = Idioms(profile, entry_prefix(namespace))
+        self.tree_ids = TreeIds(self.names)
+        self.order: Iterator[int] = itertools.count()
+        self.parts: dict[bytes, tuple[int, Element]] = {}
+        self.action_trees: dict[tuple[str, bytes], Element] = {}
         self.subtree_ports: dict[str, tuple[str, ...]] = {}
-        self.counters: dict[str, str] = {}
-        self.conditions = ConditionWriter(
-            self.task, self.names.interface, self.names.ids, self.names.values, self.tree_ids
-        )
+        self.counters: Iterator[int] = itertools.count(1)
+        self.conditions = ConditionWriter(self.task, self.names, self.tree_ids, self.idioms)
 
-    def document(self, model: bool) -> Element:
-        main_id = self.tree_ids.take(camel(self.tree.task.problem), seed=self.tree.task.problem)
+    def document(self, model: bool, with_notes: bool) -> Element:
+        """The whole document."""
+        main_id = self.tree_ids.take(self.task.problem, seed=self.task.problem)
         document = Element("root", BTCPP_format="4", main_tree_to_execute=main_id)
         main = SubElement(document, "BehaviorTree", ID=main_id)
         main.set("_description", self._headline())
-        guarded = self._written(fit(self.tree.root, ENGINE), _Place(main_id))
-        main.append(_until_blocked(guarded, list(self.counters.values())))
-        document.extend(self.hoisted)
-        document.extend(self.condition_trees.values())
+        root = fit(self.tree.root, ENGINE)
+        main.append(self.idioms.until_blocked(self._written(root, _Place(self.task.problem))))
+        document.extend(tree for _, tree in sorted(self.parts.values(), key=lambda part: part[0]))
         document.extend(self.conditions.trees.values())
         document.extend(self.action_trees.values())
-        self.subtree_ports |= {
-            tree_id: self.conditions.ports_of(tree_id) for tree_id in self.conditions.trees
-        }
         if model:
-            document.append(self._model())
+            ports = self.subtree_ports | self.conditions.ports
+            document.append(node_model(self.task, self.names, self.profile, ports))
+        if with_notes:
+            document.append(Comment(notes(self.tree, root, self.names)))
         return document
 
     def _headline(self) -> str:
         task, claim = self.task, self.tree.success_probability
-        return printable(f"{task.domain}, {task.problem}: succeeds with probability {claim}. Made by bbtc.")
+        return shown(f"{task.domain}, {task.problem}: succeeds with probability {claim}. Made by bbtc.")
 
     # --- nodes -------------------------------------------------------------------------------
 
     def _written(self, node: Node, place: _Place) -> Element:
+        if node.template is not None and place.template is not node:
+            return self._template(node, node.template, place)
         match node:
             case ControlNode():
-                if node.attempts is not None:
-                    counter = self.counters.setdefault(node.id, f"@attempts_{len(self.counters) + 1}")
-                    place = place.counting(f"{counter} < {node.attempts}", f"{counter} += 1")
-                    return self._written(node.children[0], place)
                 if place.level >= _DEEPEST_XML:
-                    return self._own_tree(node, place)
-                element = _control(node.kind, [self._written(child, place.down()) for child in node.children])
-                label = node.name or node.template or ("skipper" if node.kind == "skipper" else None)
-                if label:
-                    element.set("name", printable(label))
+                    return self._part(node, place)
+                element = self._control(node, place)
             case ConditionNode():
                 element = self._condition(node, place)
             case ActionNode():
                 element = self._action(node, place)
             case _:
                 assert_never(node)
-        if node.reason and not isinstance(node, ConditionNode):
-            element.set("_description", printable(f"for {node.reason}"))
+        if node.reason:
+            element.set("_description", f"for {shown(node.reason)}")
         return element
 
-    def _own_tree(self, node: ControlNode, place: _Place) -> Element:
-        tree_id = self.tree_ids.take(f"{place.tree_id}Part", seed=node.id)
-        tree = Element("BehaviorTree", ID=tree_id)
-        self.hoisted.append(tree)
-        tree.append(self._written(node, place.inside(tree_id)))
-        return Element("SubTree", ID=tree_id)
+    def _control(self, node: ControlNode, place: _Place) -> Element:
+        if node.attempts is not None:
+            counter = self.idioms.counter(next(self.counters))
+            inside = replace(place.down(), counters=(*place.counters, counter))
+            child = self._written(node.children[0], inside)
+            element = self.idioms.retry(counter, node.attempts, child)
+            if node.name:
+                element.set("name", shown(node.name))
+            return element
+        children = [self._written(child, place.down()) for child in node.children]
+        element = self.idioms.control(node.kind, children)
+        if node.name:
+            element.set("name", shown(node.name))
+        elif element.tag == "Parallel":
+            element.set("name", SKIPPER_LABEL)
+        return element
+
+    def _part(self, node: ControlNode, place: _Place) -> Element:
+        """A subtree in a BehaviorTree of its own, because it stands deep."""
+        order, title = next(self.order), f"{place.tree_title}Part"
+        content = self._written(node, replace(place, tree_title=title, level=0, labels=Labels()))
+        element = self._hoisted(order, title, node.id, content, tuple(place.binding.values()))
+        for port in place.binding.values():
+            element.set(port, f"{{{port}}}")
+        return element
+
+    def _template(self, node: Node, template: str, place: _Place) -> Element:
+        """The expansion of a template: a BehaviorTree with its arguments as ports, which expansions that
+        differ in nothing else share."""
+        order = next(self.order)
+        symbol, args = split_name(template)
+        binding = self._argument_ports(node, args)
+        inside = _Place(symbol, counters=place.counters, binding=binding, template=node)
+        element = self._hoisted(order, symbol, template, self._written(node, inside), tuple(binding.values()))
+        element.set("name", place.labels.unique(template_label(template)))
+        for arg, port in binding.items():
+            element.set(port, self.conditions.value(arg, place.binding))
+        return element
+
+    def _hoisted(
+        self, order: int, title: str, seed: str, content: Element, ports: tuple[str, ...]
+    ) -> Element:
+        """A SubTree that calls a BehaviorTree with this content, which is made unless there is one."""
+        key = f"{title}\n{' '.join(ports)}\n".encode(errors="replace") + tostring(content)
+        if key not in self.parts:
+            tree = Element("BehaviorTree", ID=self.tree_ids.take(title, seed=seed))
+            tree.append(content)
+            self.parts[key] = order, tree
+            self.subtree_ports[tree.attrib["ID"]] = ports
+        return Element("SubTree", ID=self.parts[key][1].attrib["ID"])
+
+    def _argument_ports(self, root: Node, args: tuple[str, ...]) -> dict[str, str]:
+        """A port for every argument of a template that the leaves of its expansion name."""
+        uses: list[tuple[str, str]] = []
+        for node in walk(root):
+            read: list[int] = []
+            if isinstance(node, ConditionNode):
+                read = list(variables(written(self.task, node.condition)))
+            elif isinstance(node, ActionNode):
+                action = self.task.action_by_name[node.action]
+                uses += self._ports(action)
+                read = list(variables(guard_of(self.task, node) or TRUE))
+            for variable in (self.task.variables[index] for index in read):
+                parameters = self.names.interface.leaves[variable_symbol(variable)].parameters
+                uses += zip(parameters, variable.args, strict=True)
+        ports = ports_for((parameter, arg) for parameter, arg in uses if arg in args)
+        return {arg: ports[arg] for arg in dict.fromkeys(args) if arg in ports}
 
     def _condition(self, node: ConditionNode, place: _Place) -> Element:
-        condition = normal(self.task, node.condition)
-        element = self.conditions.write(condition, {})
-        if self.conditions.uses_register(condition):
-            if condition not in self.condition_trees:
-                self.condition_trees[condition] = self._condition_tree(condition, element)
-            tree_id = self.condition_trees[condition].attrib["ID"]
-            label = node.name or words_of(self.task, condition).short
-            return Element("SubTree", ID=tree_id, name=place.unique(printable(label)))
-        if node.name:
-            label = printable(node.name)
-            element.set("name", place.unique(label) if element.tag == "SubTree" else label)
+        condition = written(self.task, node.condition)
+        label = shown(node.name) if node.name else None
+        compound = isinstance(condition, (And, Or))
+        if self.conditions.uses_register(condition) or (compound and label):
+            element = self.conditions.write_apart(condition, place.binding)
+            auto = self.conditions.label(condition, place.binding)
+            element.set("name", place.labels.unique(label or auto))
+            return element
+        element = self.conditions.write(condition, place.binding)
+        if label:
+            element.set("name", place.labels.unique(label) if element.tag == "SubTree" else label)
         return element
-
-    def _condition_tree(self, condition: Condition, content: Element) -> Element:
-        words = words_of(self.task, condition)
-        tree_id = self.tree_ids.take(camel(words.short), seed=words.full)
-        tree = Element("BehaviorTree", ID=tree_id)
-        tree.set("_description", f"{words.full}, three-valued")
-        tree.append(content)
-        return tree
 
     def _action(self, node: ActionNode, place: _Place) -> Element:
         action = self.task.action_by_name[node.action]
-        ports = self._ports(action)
-        # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
-        passed = {port: arg for port, arg in ports.items() if not is_numeric(arg)}
-        binding = {arg: port for port, arg in reversed(passed.items())}
-        tag = Element(self.names.ids[action_symbol(action)])
-        for port, arg in ports.items():
-            tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
-        condition = guard_of(self.task, node)
-        guard = None
-        if condition is not None:
-            guard = self.conditions.write(condition, binding)
-        if place.counters:
-            guard = _attempt(guard, place.counters)
-        suffix = ("Once" if node.latched else "Again") + ("WhenReady" if guard is not None else "")
-        key = (suffix, tostring(tag), None if guard is None else tostring(guard))
-        if key not in self.action_trees:
-            tree_id = self.tree_ids.take(f"{tag.tag}{suffix}", seed=repr(key))
-            self.action_trees[key] = (_latched if node.latched else _unlatched)(tree_id, tag, guard)
-            self.subtree_ports[tree_id] = tuple(passed)
-        tree_id = self.action_trees[key].attrib["ID"]
-        element = Element("SubTree", ID=tree_id, name=place.unique(printable(node.name or node.action)))
-        for port in self.subtree_ports[tree_id]:
-            element.set(port, self.names.values[ports[port]])
+        auto = ground_name(action.schema, tuple(place.binding.get(arg, arg) for arg in action.args))
+        label = shown(node.name or auto)
+        guard = guard_of(self.task, node)
+        if self.profile == "bbtc":
+            tag = self._leaf(action, place.binding)
+            needed = self._start_conditions(guard, place.binding, place.counters)
+            element = self.idioms.latch(tag, needed, node.latched)
+            element.set("name", label)
+            return element
+        tree_id = self._action_tree(node, action, guard, place.counters)
+        element = Element("SubTree", ID=tree_id, name=place.labels.unique(label))
+        for port, arg in self._ports(action):
+            if port in self.subtree_ports[tree_id]:
+                element.set(port, self.conditions.value(arg, place.binding))
         return element
 
-    def _ports(self, action: GroundAction) -> dict[str, str]:
-        symbol = action_symbol(action)
-        return dict(zip(self.names.interface.leaves[symbol].parameters, action.args, strict=True))
+    def _action_tree(
+        self, node: ActionNode, action: GroundAction, guard: Condition | None, counters: tuple[str, ...]
+    ) -> str:
+        """The id of the BehaviorTree that runs actions of a schema."""
+        # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
+        passed = {port: arg for port, arg in self._ports(action) if not is_numeric(arg)}
+        tag = Element(self.names.ids[action_symbol(action)])
+        for port, arg in self._ports(action):
+            tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
+        binding = {arg: port for port, arg in reversed(passed.items())}
+        needed = self._start_conditions(guard, binding, counters)
+        title = self.names.plain[action_symbol(action)]
+        title += ("Once" if node.latched else "Again") + ("WhenReady" if needed else "")
+        write = self.idioms.latched if node.latched else self.idioms.unlatched
+        content = write(tag, needed)
+        key = (title, tostring(content))
+        if key not in self.action_trees:
+            tree_id = self.tree_ids.take(title, seed=repr(key))
+            self.action_trees[key] = Element("BehaviorTree", ID=tree_id)
+            self.action_trees[key].append(content)
+            self.subtree_ports[tree_id] = tuple(passed)
+        return self.action_trees[key].attrib["ID"]
 
-    # --- palette -----------------------------------------------------------------------------
+    def _start_conditions(
+        self, guard: Condition | None, binding: Mapping[str, str], counters: tuple[str, ...]
+    ) -> list[Element]:
+        read = None if guard is None else self.conditions.write(written(self.task, guard), binding)
+        return self.idioms.start_conditions(read, counters)
 
-    def _model(self) -> Element:
-        model = Element("TreeNodesModel")
-        for condition in self.names.interface.conditions:
-            self._model_entry(model, "Condition", condition)
-        for action in self.names.interface.actions:
-            self._model_entry(model, "Action", action)
-        for tree_id in sorted(self.subtree_ports):
-            if self.subtree_ports[tree_id]:
-                entry = SubElement(model, "SubTree", ID=tree_id)
-                for port in self.subtree_ports[tree_id]:
-                    SubElement(entry, "input_port", name=port, type="std::string")
-        return model
+    def _leaf(self, action: GroundAction, binding: Mapping[str, str]) -> Element:
+        element = Element(self.names.ids[action_symbol(action)])
+        for port, arg in self._ports(action):
+            element.set(port, self.conditions.value(arg, binding))
+        return element
 
-    def _model_entry(self, model: Element, kind: str, entry: Leaf) -> None:
-        element = SubElement(model, kind, ID=self.names.ids[entry.symbol])
-        for position, port in enumerate(entry.parameters, 1):
-            text = f"argument {position} of {entry.symbol.kind} {printable(entry.symbol.name)}"
-            SubElement(element, "input_port", name=port, type="std::string").text = text
-
-
-class _Place:
-    """Where in a BehaviorTree the writer is. SubTree names are unique within one."""
-
-    def __init__(
-        self,
-        tree_id: str,
-        level: int = 0,
-        uses: dict[str, int] | None = None,
-        counters: tuple[tuple[str, str], ...] = (),
-    ) -> None:
-        self.tree_id = tree_id
-        self.level = level
-        self.counters = counters
-        self._uses = {} if uses is None else uses
-
-    def down(self) -> _Place:
-        """One level further down."""
-        return _Place(self.tree_id, self.level + 1, self._uses, self.counters)
-
-    def counting(self, test: str, count: str) -> _Place:
-        """Below a retry node: scripts that test for an attempt left, and count one."""
-        return _Place(self.tree_id, self.level, self._uses, (*self.counters, (test, count)))
-
-    def inside(self, tree_id: str) -> _Place:
-        """At the top of a BehaviorTree of its own."""
-        return _Place(tree_id, counters=self.counters)
-
-    def unique(self, label: str) -> str:
-        """The label; with a number from its second use on."""
-        while True:
-            count = self._uses[label] = self._uses.get(label, 0) + 1
-            if count == 1:
-                return label
-            label = f"{label} #{count}"
-
-
-def _control(kind: ControlKind, children: list[Element]) -> Element:
-    # The engine refuses control nodes without children; they return the status they go on with.
-    if children:
-        return control(kind, children)
-    match kind:
-        case "sequence":
-            return Element("AlwaysSuccess")
-        case "fallback" | "retry":
-            return Element("AlwaysFailure")
-        case "skipper":
-            running = Element("KeepRunningUntilFailure")
-            SubElement(running, "AlwaysSuccess")
-            return running
-        case _:
-            assert_never(kind)
-
-
-def _attempt(guard: Element | None, counters: tuple[tuple[str, str], ...]) -> Element:
-    """What must succeed before an action below retry nodes starts; then it is an attempt."""
-    left = Element("ScriptCondition", code=" && ".join(test for test, _ in counters))
-    made = Element("Script", code="; ".join(count for _, count in counters))
-    return control("sequence", [*([] if guard is None else [guard]), left, made])
-
-
-def _until_blocked(root: Element, counters: list[str]) -> Element:
-    """The tree, and FAILURE as soon as it is running while no action is: nothing can change then,
-    and a loop that ticks while RUNNING would never end. Counters are set to 0 in the first tick."""
-    outer = control("skipper", [])
-    outer.set("name", "until blocked")
-    ticked = control("sequence", [Element("Script", code="@acting := false"), root])
-    if counters:
-        once = Element("RunOnce", then_skip="false")
-        SubElement(once, "Script", code="; ".join(f"{counter} := 0" for counter in counters))
-        ticked.insert(0, once)
-    blocked = Element("Precondition", {"if": "!@acting", "else": "RUNNING"})
-    SubElement(blocked, "AlwaysFailure", name="blocked: nothing can observe what is unknown")
-    outer.extend([ticked, blocked])
-    return outer
-
-
-def _latched(tree_id: str, action: Element, guard: Element | None) -> Element:
-    """Runs the action once. Its status is withheld until the next tick, because conditions to the
-    left were read before its effect; then it is kept. Halted after its start counts as run."""
-    tree = Element("BehaviorTree", ID=tree_id)
-    latch = SubElement(tree, "Switch2", variable="{_latch}", case_1="success", case_2="failure")
-    SubElement(latch, "AlwaysSuccess")
-    SubElement(latch, "AlwaysFailure")
-    action.set("_onSuccess", "_latch := 'success'")
-    action.set("_onFailure", "_latch := 'failure'")
-    action.set("_onHalted", "_latch := 'success'")
-    running = _running(action, "@acting := true")
-    if guard is None:
-        latch.append(running)
-    else:
-        # With memory: once the action runs, its own effect may end its precondition.
-        started = SubElement(latch, "Sequence", name="start when ready")
-        started.extend([guard, running])
-    return tree
-
-
-def _unlatched(tree_id: str, action: Element, guard: Element | None) -> Element:
-    """Runs the action whenever it is ticked, again and again."""
-    tree = Element("BehaviorTree", ID=tree_id)
-    if guard is None:
-        tree.append(_running(action, "@acting := true"))
-        return tree
-    for event in ("_onSuccess", "_onFailure", "_onHalted"):
-        action.set(event, "_started := 'no'")
-    running = _running(action, "@acting := true; _started := 'yes'")
-    ready = Element("Switch2", variable="{_started}", case_1="yes", case_2="never")
-    SubElement(ready, "AlwaysSuccess")
-    SubElement(ready, "AlwaysFailure")
-    ready.append(guard)
-    running.insert(0, ready)
-    tree.append(running)
-    return tree
-
-
-def _running(action: Element, script: str) -> Element:
-    keep = Element("KeepRunningUntilFailure")
-    SubElement(keep, "ForceSuccess").append(action)
-    return control("sequence", [Element("Script", code=script), keep])
+    def _ports(self, action: GroundAction) -> list[tuple[str, str]]:
+        parameters = self.names.interface.leaves[action_symbol(action)].parameters
+        return list(zip(parameters, action.args, strict=True))

@@ -14,70 +14,35 @@ A literal is a leaf: SUCCESS, FAILURE, RUNNING for true, false, unknown. What is
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Literal
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element
 
 from typing_extensions import assert_never
 
-from bbtc.export.interface import Interface, variable_symbol
-from bbtc.export.names import Namer, Symbol
+from bbtc.export.btcpp_idioms import Idioms, decorated
+from bbtc.export.btcpp_names import BtcppNames, TreeIds, is_numeric, ports_for
+from bbtc.export.interface import variable_symbol
+from bbtc.export.names import Symbol
 from bbtc.export.shape import can_be_unknown, words_of
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
-from bbtc.tree.nodes import ControlKind
-
-_NUMBER = re.compile(r"[+-]?(?:[0-9]|\.[0-9]|inf|nan)", re.IGNORECASE)
-
-
-def control(kind: ControlKind, children: Sequence[Element]) -> Element:
-    """A memoryless control node."""
-    match kind:
-        case "sequence":
-            element = Element("ReactiveSequence")
-        case "fallback":
-            element = Element("ReactiveFallback")
-        case "skipper":
-            element = Element("Parallel", success_count="1", failure_count="1")
-        case "retry":  # attempts are counted where actions start
-            (element,) = children
-            return element
-        case _:
-            assert_never(kind)
-    element.extend(children)
-    return element
-
-
-def is_numeric(value: str) -> bool:
-    """Whether a value may change its type when it is passed to a SubTree: numbers do from 4.9 on."""
-    return _NUMBER.match(value) is not None
 
 
 class ConditionWriter:
-    """Writes conditions in normal form (:func:`bbtc.export.shape.normal`) of one tree. The
-    BehaviorTrees that they refer to gather in :attr:`trees`, by id."""
+    """Writes conditions as :func:`bbtc.export.shape.written` shapes them. The BehaviorTrees that they
+    refer to gather in :attr:`trees`, by id, with their ports in :attr:`ports`."""
 
-    def __init__(
-        self,
-        task: Task,
-        interface: Interface,
-        ids: Mapping[Symbol, str],
-        values: Mapping[str, str],
-        tree_ids: Namer,
-    ) -> None:
+    def __init__(self, task: Task, names: BtcppNames, tree_ids: TreeIds, idioms: Idioms) -> None:
         self.trees: dict[str, Element] = {}
+        self.ports: dict[str, tuple[str, ...]] = {}
         self._task = task
-        self._interface = interface
-        self._ids = ids
-        self._values = values
+        self._names = names
         self._tree_ids = tree_ids
+        self._idioms = idioms
         self._tests: dict[tuple[str, Symbol], str] = {}
-
-    def ports_of(self, tree_id: str) -> tuple[str, ...]:
-        """The ports of a BehaviorTree in :attr:`trees`."""
-        return next(self._parameters(s) for (_, s), known in self._tests.items() if known == tree_id)
+        self._registers: dict[Condition, tuple[str, dict[str, str]]] = {}
 
     def uses_register(self, condition: Condition) -> bool:
         """Whether the condition, or one inside it, is written with a blackboard entry."""
@@ -91,24 +56,82 @@ class ConditionWriter:
             case _:
                 assert_never(condition)
 
+    def label(self, condition: Condition, binding: Mapping[str, str]) -> str:
+        """The name that a condition gets where it has none of its own."""
+        return words_of(self._task, condition, binding).short
+
     def write(self, condition: Condition, binding: Mapping[str, str]) -> Element:
         """The condition as a subtree that is never left running with something remembered.
         ``binding`` maps object names to the ports of the BehaviorTree around it."""
         if self.uses_register(condition):
-            element = _read_at_once(self._kleene(condition, binding))
+            element = self._idioms.read_at_once(self._kleene(condition, binding))
         else:
             element = self._kleene(condition, binding)
         match condition:
             case Is(_, Truth.TRUE) | Constant():
                 pass
             case Is() | Known() | Not() | And() | Or():
-                # A SubTree says all in its tag, and its name would have to be unique; a condition
-                # on ports has no words of its own.
-                if not binding and element.tag != "SubTree":
-                    element.set("name", words_of(self._task, condition).short)
+                # A SubTree says all in its tag, and its name would have to be unique.
+                if element.tag != "SubTree":
+                    element.set("name", self.label(condition, binding))
             case _:
                 assert_never(condition)
         return element
+
+    def write_apart(self, condition: Condition, binding: Mapping[str, str]) -> Element:
+        """The condition as a BehaviorTree of its own, and the SubTree that calls it."""
+        if condition not in self._registers:
+            words = words_of(self._task, condition)
+            tree_id = self._tree_ids.take(self._title(condition), seed=words.full)
+            ports = self._ports(condition)
+            tree = Element("BehaviorTree", ID=tree_id)
+            tree.set("_description", f"{words_of(self._task, condition, ports).full}, three-valued")
+            tree.append(self.write(condition, ports))
+            self._registers[condition] = tree_id, ports
+            self.trees[tree_id] = tree
+            self.ports[tree_id] = tuple(ports.values())
+        tree_id, ports = self._registers[condition]
+        element = Element("SubTree", ID=tree_id)
+        for arg, port in ports.items():
+            element.set(port, self.value(arg, binding))
+        return element
+
+    def value(self, arg: str, binding: Mapping[str, str]) -> str:
+        """An object as the value of a port."""
+        return f"{{{binding[arg]}}}" if arg in binding else self._names.values[arg]
+
+    def _ports(self, condition: Condition) -> dict[str, str]:
+        """A port for every object of a condition, named as the parameter it first stands for."""
+        uses = (
+            (parameter, arg)
+            for variable in dict.fromkeys(variables(condition))
+            for parameter, arg in zip(
+                self._parameters(variable_symbol(self._task.variables[variable])),
+                self._task.variables[variable].args,
+                strict=True,
+            )
+        )
+        return ports_for(uses)
+
+    def _title(self, condition: Condition) -> str:
+        match condition:
+            case Constant(value):
+                return str(value)
+            case Is(variable, Truth.TRUE):
+                return self._names.plain[variable_symbol(self._task.variables[variable])]
+            case Is(variable, value):
+                word = "Not" if value is Truth.FALSE else "Unknown"
+                return word + self._names.plain[variable_symbol(self._task.variables[variable])]
+            case Known(variable):
+                return "Known" + self._names.plain[variable_symbol(self._task.variables[variable])]
+            case Not(part):
+                return "Not" + self._title(part)
+            case And(parts):
+                return "And".join(map(self._title, parts))
+            case Or(parts):
+                return "Or".join(map(self._title, parts))
+            case _:
+                assert_never(condition)
 
     def _kleene(self, condition: Condition, binding: Mapping[str, str]) -> Element:
         match condition:
@@ -117,13 +140,13 @@ class ConditionWriter:
             case Is(variable, Truth.TRUE):
                 return self._leaf(variable, binding)
             case Is(variable, Truth.FALSE):
-                return _decorated("Inverter", self._leaf(variable, binding))
+                return decorated("Inverter", self._leaf(variable, binding))
             case Is(variable, _):
-                return self._test("Unknown", variable, binding)
+                return self._test("unknown", variable, binding)
             case Known(variable):
-                return self._test("Known", variable, binding)
+                return self._test("known", variable, binding)
             case Not(part):
-                return _decorated("Inverter", self._kleene(part, binding))
+                return decorated("Inverter", self._kleene(part, binding))
             case And(parts):
                 return self._junction("sequence", parts, binding)
             case Or(parts):
@@ -137,34 +160,36 @@ class ConditionWriter:
         parts: tuple[Condition, ...],
         binding: Mapping[str, str],
     ) -> Element:
-        ordered = sorted(parts, key=lambda part: can_be_unknown(self._task, part))
+        elements = [self._kleene(part, binding) for part in parts]
         unknowable = sum(can_be_unknown(self._task, part) for part in parts)
         if unknowable <= 1:
-            return control(kind, [self._kleene(part, binding) for part in ordered])
+            return self._idioms.control(kind, elements)
         all_of, one_of = str(len(parts)), "1"
         if kind == "sequence":
             element = Element("Parallel", success_count=all_of, failure_count=one_of)
         else:
             element = Element("Parallel", success_count=one_of, failure_count=all_of)
-        element.extend(self._kleene(part, binding) for part in parts)
+        element.extend(elements)
         return element
 
     def _leaf(self, variable: int, binding: Mapping[str, str]) -> Element:
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
-        return self._with_ports(Element(self._ids[symbol]), symbol, read.args, binding)
+        return self._with_ports(Element(self._names.ids[symbol]), symbol, read.args, binding)
 
-    def _test(self, kind: Literal["Known", "Unknown"], variable: int, binding: Mapping[str, str]) -> Element:
+    def _test(self, kind: Literal["known", "unknown"], variable: int, binding: Mapping[str, str]) -> Element:
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
         if any(is_numeric(arg) for arg in read.args):
-            return _test_of(kind, self._leaf(variable, binding))
+            return self._idioms.test(kind, self._leaf(variable, binding))
         if (kind, symbol) not in self._tests:
-            tree_id = self._tree_ids.take(f"{kind}{self._ids[symbol]}", seed=symbol.name)
+            title = f"{kind.capitalize()}{self._names.plain[symbol]}"
+            tree_id = self._tree_ids.take(title, seed=symbol.name)
             ports = self._parameters(symbol)
-            leaf = Element(self._ids[symbol], {port: f"{{{port}}}" for port in ports})
+            leaf = Element(self._names.ids[symbol], {port: f"{{{port}}}" for port in ports})
             self.trees[tree_id] = Element("BehaviorTree", ID=tree_id)
-            self.trees[tree_id].append(_test_of(kind, leaf))
+            self.trees[tree_id].append(self._idioms.test(kind, leaf))
+            self.ports[tree_id] = ports
             self._tests[kind, symbol] = tree_id
         return self._with_ports(Element("SubTree", ID=self._tests[kind, symbol]), symbol, read.args, binding)
 
@@ -172,31 +197,8 @@ class ConditionWriter:
         self, element: Element, symbol: Symbol, args: tuple[str, ...], binding: Mapping[str, str]
     ) -> Element:
         for parameter, arg in zip(self._parameters(symbol), args, strict=True):
-            element.set(parameter, f"{{{binding[arg]}}}" if arg in binding else self._values[arg])
+            element.set(parameter, self.value(arg, binding))
         return element
 
     def _parameters(self, symbol: Symbol) -> tuple[str, ...]:
-        return self._interface.leaves[symbol].parameters
-
-
-def _test_of(kind: Literal["Known", "Unknown"], leaf: Element) -> Element:
-    forced, otherwise = (
-        ("ForceSuccess", "AlwaysFailure") if kind == "Known" else ("ForceFailure", "AlwaysSuccess")
-    )
-    return control("skipper", [_decorated(forced, leaf), Element(otherwise)])
-
-
-def _decorated(decorator: str, child: Element) -> Element:
-    element = Element(decorator)
-    element.append(child)
-    return element
-
-
-def _read_at_once(condition: Element) -> Element:
-    condition.set("_onSuccess", "_value := 'true'")
-    condition.set("_onFailure", "_value := 'false'")
-    unknown = Element("Script", code="_value := 'unknown'")
-    read = control("skipper", [_decorated("ForceSuccess", condition), unknown])
-    answer = Element("Precondition", {"if": "_value != 'unknown'", "else": "RUNNING"})
-    SubElement(answer, "ScriptCondition", code="_value == 'true'")
-    return control("sequence", [read, answer])
+        return self._names.interface.leaves[symbol].parameters

@@ -27,7 +27,7 @@ _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9]*(?:[-_][A-Za-z0-9]+)*")
 _SAFE_VALUE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 _WORDS = re.compile(r"[A-Za-z0-9]+")
 
-PYTHON_RESERVED = frozenset(keyword.kwlist) | {"self", "bool", "str", "cancel"}
+PYTHON_RESERVED = frozenset(keyword.kwlist) | {"self", "bool", "str", "cancel", "setup"}
 """Names that a method of a generated interface cannot have, whatever the letter case."""
 
 Kind = Literal["predicate", "action", "parameter"]
@@ -94,6 +94,25 @@ def port_values(names: Iterable[str]) -> dict[str, str]:
 def camel(text: str) -> str:
     """A CamelCase identifier for any text, not injective."""
     return _base(text, "camel")
+
+
+_TAKEN_MODULES = frozenset(
+    {"argparse", "bbtc", "collections", "fractions", "math", "py_trees", "random", "time", "typing", "urllib"}
+)
+
+
+def module_name(text: str) -> str:
+    """A snake-case name for a Python module, or a part of one. Names that are not plain get a digest,
+    keywords and what generated modules import themselves the prefix ``tree_``."""
+    base = _base(text, "snake")
+    if not _is_plain(text):
+        return _with_digest(base, text, 8)
+    return f"tree_{base}" if base in PYTHON_RESERVED | _TAKEN_MODULES else base
+
+
+def snake(text: str) -> str:
+    """A snake_case identifier for any text, not injective."""
+    return _base(text, "snake")
 
 
 def printable(text: str) -> str:

@@ -82,6 +82,7 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
         "svg": "bbtc.export.graphviz:svg",
         "png": "bbtc.export.graphviz:png",
         "btcpp": "bbtc.export.btcpp:btcpp",
+        "btcpp_palette": "bbtc.export.btcpp_palette:btcpp_palette",
         "py_trees": "bbtc.export.pytrees:py_trees",
     }
 )

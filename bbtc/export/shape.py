@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 from typing_extensions import assert_never
 
@@ -23,7 +25,7 @@ from bbtc.ground.condition import (
     negation,
 )
 from bbtc.ground.describe import describe
-from bbtc.ground.task import Task
+from bbtc.ground.task import Task, Variable, ground_name
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
@@ -116,6 +118,27 @@ def _normal(task: Task, condition: Condition) -> Condition:
             assert_never(condition)
 
 
+def written(task: Task, condition: Condition) -> Condition:
+    """The condition as exports hold it: in normal form (:func:`normal`), and where at most one part
+    of an ``and`` or ``or`` can be unknown, with that part last. Then the first part that decides is
+    met before the unknown one. Raises :class:`BbtcError` if it is too deep."""
+    return _ordered(task, normal(task, condition))
+
+
+def _ordered(task: Task, condition: Condition) -> Condition:
+    match condition:
+        case And(parts) | Or(parts):
+            inner = [_ordered(task, part) for part in parts]
+            unknowable = [can_be_unknown(task, part) for part in inner]
+            if sum(unknowable) == 1:
+                inner.append(inner.pop(unknowable.index(True)))
+            return replace(condition, parts=tuple(inner))
+        case Is() | Known() | Not() | Constant():
+            return condition
+        case _:
+            assert_never(condition)
+
+
 @dataclass(frozen=True, slots=True)
 class Words:
     """A condition in words, printable: in full, and cut to the length of a label."""
@@ -124,9 +147,13 @@ class Words:
     short: str
 
 
-def words_of(task: Task, condition: Condition) -> Words:
-    """A condition in words."""
-    full = printable(describe(task, condition))
+def words_of(task: Task, condition: Condition, binding: Mapping[str, str] = MappingProxyType({})) -> Words:
+    """A condition in words. ``binding`` renames objects, to the parameters they stand for."""
+
+    def named(variable: Variable) -> str:
+        return ground_name(variable.predicate, tuple(binding.get(arg, arg) for arg in variable.args))
+
+    full = printable(describe(task, condition, named if binding else None))
     return Words(full, full if len(full) <= _LONGEST_LABEL else full[: _LONGEST_LABEL - 1] + "…")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from typing_extensions import assert_never
 
@@ -11,24 +11,30 @@ from bbtc.ground.task import Task, Variable
 from bbtc.kleene import Truth
 
 
-def describe(task: Task, condition: Condition) -> str:
+def describe(task: Task, condition: Condition, name_of: Callable[[Variable], str] | None = None) -> str:
     """``seen(soda)``, ``not seen(soda)``, ``unknown seen(soda)``, ``known seen(soda)``,
-    ``(a() and not b())``: the condition in words, on one line."""
+    ``(a() and not b())``: the condition in words, on one line. ``name_of`` names the variables where
+    their own names will not do."""
+
+    def named(variable: int) -> str:
+        read = task.variables[variable]
+        return read.name if name_of is None else name_of(read)
+
     match condition:
         case Is(variable, Truth.TRUE):
-            return task.variables[variable].name
+            return named(variable)
         case Is(variable, Truth.FALSE):
-            return f"not {task.variables[variable].name}"
+            return f"not {named(variable)}"
         case Is(variable, _):
-            return f"unknown {task.variables[variable].name}"
+            return f"unknown {named(variable)}"
         case Known(variable):
-            return f"known {task.variables[variable].name}"
+            return f"known {named(variable)}"
         case And(parts):
-            return f"({' and '.join(describe(task, part) for part in parts)})"
+            return f"({' and '.join(describe(task, part, name_of) for part in parts)})"
         case Or(parts):
-            return f"({' or '.join(describe(task, part) for part in parts)})"
+            return f"({' or '.join(describe(task, part, name_of) for part in parts)})"
         case Not(part):
-            return f"not {describe(task, part)}"
+            return f"not {describe(task, part, name_of)}"
         case Constant(value):
             return Truth.of(value).word
         case _:

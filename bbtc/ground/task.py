@@ -22,6 +22,14 @@ def ground_name(symbol: str, args: tuple[str, ...]) -> str:
     return f"{symbol}({','.join(args)})"
 
 
+def split_name(name: str) -> tuple[str, tuple[str, ...]]:
+    """Symbol and arguments of a ground name, as far as the name alone tells: what it says of one
+    that :func:`ground_name` made of words with commas or brackets in them need not be right."""
+    symbol, _, rest = name.partition("(")
+    inner = rest.removesuffix(")")
+    return symbol, tuple(inner.split(",")) if inner else ()
+
+
 @dataclass(frozen=True, slots=True)
 class Variable:
     """One ground predicate. ``three_valued`` if anything in the task can make it unknown."""

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from bbtc.diagnostics import BbtcError
-from bbtc.export.btcpp import RESERVED
+from bbtc.export.btcpp_names import RESERVED
 from bbtc.export.registry import load_exporter, parse_options
 from bbtc.export.shape import DEEPEST_CONDITION, DEEPEST_TREE
 from bbtc.ground.condition import TRUE, And, Condition, Is, Known, Not, Or
@@ -77,7 +77,7 @@ def check_nodes(tree: ET.Element, entries: dict[str, ET.Element], tree_ids: set[
             assert own == ({port.attrib["name"] for port in model} if model is not None else set())
             assert not any(re.match(r"[0-9.+-]", node.attrib[port]) for port in own)
         elif node.tag in entries:
-            assert own == {port.attrib["name"] for port in entries[node.tag]}
+            assert own == {port.attrib["name"] for port in entries[node.tag].iter("input_port")}
             assert len(node) == 0
         else:
             assert node.tag in RESERVED

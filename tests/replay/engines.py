@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from bbtc.export.btcpp import BtcppNames, btcpp, btcpp_names
+from bbtc.export.btcpp import btcpp
+from bbtc.export.btcpp_names import BtcppNames, btcpp_names
 from bbtc.export.names import Symbol
 from bbtc.export.pytrees import py_trees, py_trees_names
 from bbtc.ground.task import ground_name
@@ -37,7 +38,7 @@ class PyTreesReplay:
         self._task = tree.task
         self._names = py_trees_names(tree)
         self.world: ScriptedWorld | None = None
-        self.source = py_trees.export(tree, {}, None)
+        self.source = py_trees.export(tree, {"runtime": "embedded"}, None)
         self._module = types.ModuleType("exported")
         exec(compile(self.source, "<exported>", "exec"), self._module.__dict__)
 
@@ -123,7 +124,7 @@ class BtcppReplay:
         model = document.find("TreeNodesModel")
         assert model is not None
         declared = {
-            entry.attrib["ID"]: [port.attrib["name"] for port in entry]
+            entry.attrib["ID"]: [port.attrib["name"] for port in entry.iter("input_port")]
             for entry in model
             if entry.tag in ("Action", "Condition")
         }

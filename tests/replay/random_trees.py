@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 
@@ -86,7 +87,19 @@ def random_tree(seed: int, latched: float = 0.85, guarded: float = 0.3, depth: i
         task = random_task(rng)
         root = _Grower(rng, task, latched, guarded).node(depth, False)
         if sum(1 for _ in actions_of(root)) >= 3:
+            root = _with_templates(root, random.Random(-seed - 1))
             return Tree(task, root, Fraction(1, 2), Fraction(1), "stuck")
+
+
+def _with_templates(node: Node, rng: random.Random) -> Node:
+    """The node with labels, as if parts of it were expansions of templates, some with the objects of
+    the tasks for arguments."""
+    if isinstance(node, ControlNode):
+        node = replace(node, children=tuple(_with_templates(child, rng) for child in node.children))
+    if rng.random() < 0.85:
+        return node
+    args = rng.sample(["a", "b", "7", "c"], rng.randint(0, 3))
+    return replace(node, template=f"{rng.choice('st')}({','.join(args)})")
 
 
 class _Grower:

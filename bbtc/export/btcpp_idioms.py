@@ -1,0 +1,173 @@
+"""What the nodes of a BBT are written as in BehaviorTree.CPP: from stock nodes, or with two of ours.
+
+Two profiles: ``stock`` writes Skippers as Parallels and keeps latches in BehaviorTrees of their own;
+``bbtc`` uses the control nodes Skipper and Latch of ``bbtc_nodes.hpp``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+from xml.etree.ElementTree import Element, SubElement
+
+from typing_extensions import assert_never
+
+from bbtc.tree.nodes import ControlKind
+
+Profile: TypeAlias = Literal["stock", "bbtc"]
+
+SKIPPER, LATCH = "Skipper", "Latch"
+"""Ids of our own control nodes."""
+
+SKIPPER_LABEL = "skipper"
+"""The name that a Parallel gets where the Skipper has none."""
+
+BLOCKED_LABEL = "until blocked"
+WHEN_READY_LABEL = "start when ready"
+
+
+@dataclass(frozen=True, slots=True)
+class Idioms:
+    """Writes nodes in one profile. ``prefix`` comes before the names of entries of the root
+    blackboard."""
+
+    profile: Profile = "stock"
+    prefix: str = ""
+
+    @property
+    def acting(self) -> str:
+        """The entry that tells whether the tick has reached a running action."""
+        return f"{self.prefix}acting"
+
+    def counter(self, number: int) -> str:
+        """The entry that counts the attempts a retry node has left."""
+        return f"@{self.prefix}attempts_left_{number}"
+
+    # --- control nodes -----------------------------------------------------------------------
+
+    def control(self, kind: ControlKind, children: Sequence[Element]) -> Element:
+        """A memoryless control node (not for ``retry``: see :meth:`retry`). The engine refuses control
+        nodes without children; they return the status they go on with."""
+        match kind:
+            case "sequence":
+                return _around("ReactiveSequence" if children else "AlwaysSuccess", children)
+            case "fallback":
+                return _around("ReactiveFallback" if children else "AlwaysFailure", children)
+            case "skipper" if not children:
+                return decorated("KeepRunningUntilFailure", Element("AlwaysSuccess"))
+            case "skipper" if self.profile == "bbtc":
+                return _around(SKIPPER, children)
+            case "skipper":
+                element = _around("Parallel", children)
+                element.set("success_count", "1")
+                element.set("failure_count", "1")
+                return element
+            case "retry":
+                raise ValueError("a retry node has its own form")
+            case _:
+                assert_never(kind)
+
+    def retry(self, counter: str, attempts: int, child: Element) -> Element:
+        """The child, and the number of attempts that actions below it may make, set once."""
+        once = Element("RunOnce", then_skip="false")
+        SubElement(once, "Script", code=f"{counter} := {attempts}")
+        element = self.control("sequence", [once, child])
+        element.set("name", f"at most {attempts} attempt{'s' if attempts > 1 else ''}")
+        return element
+
+    def until_blocked(self, root: Element) -> Element:
+        """The tree, and FAILURE as soon as it is running while no action is: nothing can change
+        then, and a loop that ticks while RUNNING would never end."""
+        ticked = self.control("sequence", [Element("Script", code=f"@{self.acting} := false"), root])
+        blocked = Element("Precondition", {"if": f"!@{self.acting}", "else": "RUNNING"})
+        SubElement(blocked, "AlwaysFailure", name="blocked: nothing can observe what is unknown")
+        outer = self.control("skipper", [ticked, blocked])
+        outer.set("name", BLOCKED_LABEL)
+        return outer
+
+    # --- actions -----------------------------------------------------------------------------
+
+    def start_conditions(self, guard: Element | None, counters: Sequence[str]) -> list[Element]:
+        """What must succeed, in this order, before an action starts: its guard, and an attempt left of
+        every retry node around it, which is then used up."""
+        needed = [] if guard is None else [guard]
+        if counters:
+            needed.append(Element("ScriptCondition", code=" && ".join(f"{c} > 0" for c in counters)))
+            needed.append(Element("Script", code="; ".join(f"{c} -= 1" for c in counters)))
+        return needed
+
+    def latch(self, action: Element, needed: Sequence[Element], latched: bool) -> Element:
+        """The action with our node Latch, which does what :meth:`latched` or :meth:`unlatched` does."""
+        element = _around(LATCH, [*needed, action])
+        if not latched:
+            element.set("keep", "false")
+        if self.prefix:
+            element.set("flag", self.acting)
+        return element
+
+    def latched(self, action: Element, needed: Sequence[Element]) -> Element:
+        """Runs the action once. Its status is withheld until the next tick, because conditions to the
+        left were read before its effect; then it is kept. Halted after its start counts as run."""
+        latch = Element("Switch2", variable="{_latch}", case_1="success", case_2="failure")
+        SubElement(latch, "AlwaysSuccess")
+        SubElement(latch, "AlwaysFailure")
+        action.set("_onSuccess", "_latch := 'success'")
+        action.set("_onFailure", "_latch := 'failure'")
+        action.set("_onHalted", "_latch := 'success'")
+        running = self._running(action, f"@{self.acting} := true")
+        if needed:
+            # With memory: once the action runs, its own effect may end its precondition.
+            started = SubElement(latch, "Sequence", name=WHEN_READY_LABEL)
+            started.extend([*needed, running])
+        else:
+            latch.append(running)
+        return latch
+
+    def unlatched(self, action: Element, needed: Sequence[Element]) -> Element:
+        """Runs the action whenever it is ticked, again and again."""
+        if not needed:
+            return self._running(action, f"@{self.acting} := true")
+        for event in ("_onSuccess", "_onFailure", "_onHalted"):
+            action.set(event, "_started := 'no'")
+        running = self._running(action, f"@{self.acting} := true; _started := 'yes'")
+        ready = Element("Switch2", variable="{_started}", case_1="yes", case_2="never")
+        SubElement(ready, "AlwaysSuccess")
+        SubElement(ready, "AlwaysFailure")
+        ready.append(needed[0] if len(needed) == 1 else self.control("sequence", needed))
+        running.insert(0, ready)
+        return running
+
+    def _running(self, action: Element, script: str) -> Element:
+        keep = decorated("KeepRunningUntilFailure", decorated("ForceSuccess", action))
+        return self.control("sequence", [Element("Script", code=script), keep])
+
+    # --- tests and registers -----------------------------------------------------------------
+
+    def test(self, kind: Literal["known", "unknown"], leaf: Element) -> Element:
+        """Success or failure for whether a condition is known (unknown)."""
+        known = kind == "known"
+        forced = decorated("ForceSuccess" if known else "ForceFailure", leaf)
+        return self.control("skipper", [forced, Element("AlwaysFailure" if known else "AlwaysSuccess")])
+
+    def read_at_once(self, condition: Element) -> Element:
+        """The result of a Parallel, which is not left running when the tick ends: it goes to an entry
+        of the blackboard, and is read back."""
+        condition.set("_onSuccess", "_value := 'true'")
+        condition.set("_onFailure", "_value := 'false'")
+        unknown = Element("Script", code="_value := 'unknown'")
+        read = self.control("skipper", [decorated("ForceSuccess", condition), unknown])
+        answer = Element("Precondition", {"if": "_value != 'unknown'", "else": "RUNNING"})
+        SubElement(answer, "ScriptCondition", code="_value == 'true'")
+        return self.control("sequence", [read, answer])
+
+
+def decorated(decorator: str, child: Element) -> Element:
+    """A node around one other."""
+    return _around(decorator, [child])
+
+
+def _around(tag: str, children: Sequence[Element]) -> Element:
+    element = Element(tag)
+    element.extend(children)
+    return element
