@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import Figures, figures, flow
 from bbtc.belief.soundness import violations
-from bbtc.diagnostics import BbtcError, Related, Report, Severity
+from bbtc.diagnostics import BbtcError, Diagnostic, Related, Report, Severity
 from bbtc.export.registry import Artefact, load_exporter, parse_options
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -19,7 +19,7 @@ from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.result import Plan, Progress
 from bbtc.plan.strategies import run_strategy
 from bbtc.source import SourceFile
-from bbtc.syntax.ast import Definition, Document
+from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import Tree
 from bbtc.tree.validate import check_tree
 
@@ -81,6 +81,72 @@ def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
                 report.add(diagnostic)
         report.raise_errors()
     return model
+
+
+def check_documents(documents: Iterable[Document], report: Report) -> None:
+    """Everything that is wrong or doubtful in domains and problems, to the report. Each problem is checked
+    with the domain of its name; what rests on one problem is a warning only where it holds for all of
+    its domain's."""
+    from bbtc.analysis.check import check
+    from bbtc.analysis.resolve import resolve
+
+    definitions = [definition for document in documents for definition in document.definitions]
+    domains: dict[str, Definition] = {}
+    problems: list[tuple[Definition, list[Definition | None]]] = []
+    for domain in (definition for definition in definitions if definition.kind == "domain"):
+        problems.append((domain, []))
+        first = domains.setdefault(domain.name.key, domain)
+        if first is not domain:
+            report.warning(
+                "BBT0208",
+                f"domain `{domain.name.text}` is defined twice",
+                domain.name.span,
+                "problems are checked with the first one",
+                [Related("the first one", first.name.span)],
+            )
+    for problem in (definition for definition in definitions if definition.kind == "problem"):
+        home = _domain_of(problem, domains)
+        if home is None:
+            message = f"the domain of problem `{problem.name.text}` is not among the files"
+            hint = "give its file, too: without it, only the syntax is checked"
+            report.add(Diagnostic("BBT0006", message, problem.name.span, hint, Severity.NOTE))
+        for domain, its_problems in problems:
+            if domain is home:
+                its_problems.append(problem)
+    for domain, its_problems in problems:
+        models = []
+        for each in its_problems or [None]:
+            # A report of its own: the errors of one problem do not hide the checks of the next.
+            own = Report()
+            model = resolve(domain, each, own)
+            models.extend([] if model is None else [model])
+            for diagnostic in own:
+                report.add(diagnostic)
+        for diagnostic in check(*models) if models else ():
+            report.add(diagnostic)
+
+
+def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:
+    wanted = next((s.name.key for s in problem.sections if isinstance(s, DomainReference)), None)
+    if wanted in domains:
+        return domains[wanted]
+    return next(iter(domains.values())) if len(domains) == 1 else None
+
+
+def format_source(source: SourceFile) -> str:
+    """The text in canonical layout. Raises :class:`BbtcError` for syntax errors."""
+    from bbtc.syntax.parser import parse
+    from bbtc.syntax.printer import print_document
+
+    report = Report()
+    document = parse(source, report)
+    report.raise_errors()
+    text = print_document(document)
+    # The layout must never change what a file says: a bug here must not cost anybody a domain.
+    again = parse(SourceFile(source.name, text), report)
+    if again.definitions != document.definitions or len(again.comments) != len(document.comments):
+        raise AssertionError(f"the layout of {source.name} would change its meaning")
+    return text
 
 
 def compile_sources(

@@ -15,6 +15,8 @@ MAX_LENGTH = 100_000
 """Characters a number may have in an artefact, so that reading one cannot take minutes."""
 
 _MAX_DECIMALS = 18
+_LONGEST_WRITTEN = 1000  # characters; a probability with more is a mistake or an attack
+_LONG_EXPONENT = re.compile(r"[eE][-+]?[0-9_]{4}")  # 10 to such powers takes for ever to compute
 _CHUNK = 1000  # digits converted at a time: Python refuses to convert more than 4300 at once
 _NUMBER = re.compile(r"(-?)(?:([0-9]+)(?:\.([0-9]+))?|([0-9]+)/([0-9]+))", re.ASCII)
 
@@ -51,6 +53,20 @@ def parse_number(text: str) -> Fraction:
         decimals = decimals or ""
         value = Fraction(_integer(whole + decimals), 10 ** len(decimals))
     return -value if sign else value
+
+
+def parse_probability(text: str) -> Fraction:
+    """The value of an exact probability as people write it: ``0.9``, ``9/10``, ``90%``, ``1e-3``.
+    Raises ``ValueError`` for any other text and for a value outside [0, 1]."""
+    costly = len(text) > _LONGEST_WRITTEN or _LONG_EXPONENT.search(text)
+    written = "" if costly else text
+    try:
+        number = Fraction(written[:-1]) / 100 if written.endswith("%") else Fraction(written)
+    except (ValueError, ZeroDivisionError):
+        raise ValueError(f"'{text[:40]}' is not a probability such as 0.9, 9/10 or 90%") from None
+    if not 0 <= number <= 1:
+        raise ValueError(f"{text[:40]} is not between 0 and 1")
+    return number
 
 
 def _decimals(denominator: int) -> int:

@@ -9,8 +9,7 @@ import click
 from bbtc.cli.session import Session, reading_limits
 from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
-from bbtc.diagnostics import Diagnostic, Related, Report, Severity
-from bbtc.syntax.ast import Definition, Document
+from bbtc.diagnostics import Diagnostic, Report, Severity
 
 
 class CodePrefixes(click.ParamType):  # type: ignore[type-arg,unused-ignore]
@@ -65,13 +64,13 @@ def command(
     Errors are always shown. `bbtc explain CODE` tells more about a code.
     """
     from bbtc.cli.wording import counted
-    from bbtc.pipeline import parse_all
+    from bbtc.pipeline import check_documents, parse_all
 
     report = Report()
     try:
         documents = parse_all([session.read(file) for file in files], report, session.limits)
         if not report.errors:
-            _check(documents, report)
+            check_documents(documents, report)
     finally:
         for diagnostic in chosen(report, sum(select, ()), sum(ignore, ())):
             session.report.add(diagnostic)
@@ -97,52 +96,3 @@ def chosen(
         return diagnostic.severity is Severity.ERROR or selected > fit(diagnostic.code, ignore)
 
     return [diagnostic for diagnostic in diagnostics if shown(diagnostic)]
-
-
-def _check(documents: Iterable[Document], report: Report) -> None:
-    from bbtc.analysis.check import check
-    from bbtc.analysis.resolve import resolve
-
-    definitions = [definition for document in documents for definition in document.definitions]
-    domains: dict[str, Definition] = {}
-    problems: list[tuple[Definition, list[Definition | None]]] = []
-    for domain in (definition for definition in definitions if definition.kind == "domain"):
-        problems.append((domain, []))
-        first = domains.setdefault(domain.name.key, domain)
-        if first is not domain:
-            report.warning(
-                "BBT0208",
-                f"domain `{domain.name.text}` is defined twice",
-                domain.name.span,
-                "problems are checked with the first one",
-                [Related("the first one", first.name.span)],
-            )
-    for problem in (definition for definition in definitions if definition.kind == "problem"):
-        home = _domain_of(problem, domains)
-        if home is None:
-            message = f"the domain of problem `{problem.name.text}` is not among the files"
-            hint = "give its file, too: without it, only the syntax is checked"
-            report.add(Diagnostic("BBT0006", message, problem.name.span, hint, Severity.NOTE))
-        for domain, its_problems in problems:
-            if domain is home:
-                its_problems.append(problem)
-    for domain, its_problems in problems:
-        models = []
-        for each in its_problems or [None]:
-            # A report of its own: the errors of one problem do not hide the checks of the next.
-            own = Report()
-            model = resolve(domain, each, own)
-            models.extend([] if model is None else [model])
-            for diagnostic in own:
-                report.add(diagnostic)
-        for diagnostic in check(*models) if models else ():
-            report.add(diagnostic)
-
-
-def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:
-    from bbtc.syntax.ast import DomainReference
-
-    wanted = next((s.name.key for s in problem.sections if isinstance(s, DomainReference)), None)
-    if wanted in domains:
-        return domains[wanted]
-    return next(iter(domains.values())) if len(domains) == 1 else None

@@ -4,20 +4,13 @@ from __future__ import annotations
 
 import difflib
 import re
-from importlib.resources import files
-from pathlib import Path
 
 import click
 
+from bbtc.cli.session import Session
+from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
-
-
-def page(code: str) -> str:
-    """The page of a registered code: package data in a wheel, ``docs/errors/`` in a checkout."""
-    packaged = files("bbtc") / "errors" / f"{code}.md"
-    if packaged.is_file():
-        return packaged.read_text("utf-8")
-    return (Path(__file__).parents[2] / "docs" / "errors" / f"{code}.md").read_text("utf-8")
+from bbtc.pages import page
 
 
 def _code(text: str) -> str:
@@ -39,7 +32,8 @@ def _code(text: str) -> str:
 
 @click.command("explain")
 @click.argument("code", required=False)
-def command(code: str | None) -> None:
+@session_command
+def command(session: Session, code: str | None) -> None:  # noqa: ARG001
     """Explain what CODE (such as BBT0202) means, why it is reported, and how to mend it. Without
     CODE, list all codes."""
     if code is None:

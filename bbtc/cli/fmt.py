@@ -7,7 +7,6 @@ import click
 from bbtc.cli.session import Session
 from bbtc.cli.session import command as session_command
 from bbtc.diagnostics import BbtcError
-from bbtc.source import SourceFile
 
 
 @click.command("fmt")
@@ -23,13 +22,14 @@ def command(session: Session, files: tuple[str, ...], check: bool) -> None:
     """
     from bbtc.cli.wording import counted
     from bbtc.files import drift, write
+    from bbtc.pipeline import format_source
 
     files = tuple(dict.fromkeys(files))
     changed = 0
     for file in files:
         try:
             source = session.read(file)
-            text = _formatted(source)
+            text = format_source(source)
             if file == "-" and check and text != source.text:
                 raise drift(source.name, source.text.encode(), text.encode())
             changed += write(file, text, check=check)
@@ -40,20 +40,3 @@ def command(session: Session, files: tuple[str, ...], check: bool) -> None:
     session.report.raise_errors()
     if files != ("-",):
         session.say(f"{counted(len(files), 'file')}, {changed} changed")
-
-
-def _formatted(source: SourceFile) -> str:
-    """The text in canonical layout. Raises :class:`BbtcError` for syntax errors."""
-    from bbtc.diagnostics import Report
-    from bbtc.syntax.parser import parse
-    from bbtc.syntax.printer import print_document
-
-    report = Report()
-    document = parse(source, report)
-    report.raise_errors()
-    text = print_document(document)
-    # The layout must never change what a file says: a bug here must not cost anybody a domain.
-    again = parse(SourceFile(source.name, text), report)
-    if again.definitions != document.definitions or len(again.comments) != len(document.comments):
-        raise AssertionError(f"the layout of {source.name} would change its meaning")
-    return text

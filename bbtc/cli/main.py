@@ -11,12 +11,16 @@ from importlib import import_module
 
 import click
 
+from bbtc import __version__
+
 COMMANDS = {
     "fmt": "Give domains and problems their canonical layout.",
     "check": "Report what is wrong or doubtful in domains and problems.",
     "compile": "Parse, check and ground a problem into a task.",
     "plan": "Plan a tree that reaches the goal with the wanted probability.",
     "simulate": "Print the exact figures of a tree.",
+    "run": "Watch a tree tick against the simulated world.",
+    "diff": "Tell what changed from one tree to another.",
     "export": "Write a tree for people or for an execution engine.",
     "explain": "Explain what a code of a message means.",
 }
@@ -50,9 +54,7 @@ class LazyGroup(click.Group):
 
 def _print_version(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
     if value and not ctx.resilient_parsing:
-        from importlib.metadata import version
-
-        click.echo(f"bbtc {version('bbtc')}")
+        click.echo(f"bbtc {__version__}")
         ctx.exit()
 
 

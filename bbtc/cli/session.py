@@ -18,8 +18,6 @@ from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 
-_LONGEST_NUMBER = 1000  # characters; more digits than that are a mistake or an attack
-
 
 @dataclass(slots=True)
 class Session:
@@ -92,14 +90,12 @@ class Probability(click.ParamType):  # type: ignore[type-arg,unused-ignore]
         """The value as a rational in [0, 1]; anything else is wrong usage."""
         if isinstance(value, Fraction):
             return value
-        text = str(value)[:_LONGEST_NUMBER]
+        from bbtc.artefacts.numbers import parse_probability
+
         try:
-            number = Fraction(text[:-1]) / 100 if text.endswith("%") else Fraction(text)
-        except (ValueError, ZeroDivisionError):
-            self.fail(f"'{text[:40]}' is not a probability such as 0.9, 9/10 or 90%", param, ctx)
-        if not 0 <= number <= 1:
-            self.fail(f"{text} is not between 0 and 1", param, ctx)
-        return number
+            return parse_probability(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
 def output_options(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -55,6 +55,10 @@ class Plan:
     refinements: tuple[Refinement, ...]
     stop: Diagnostic | None = None
 
+    def _repr_svg_(self) -> str:
+        """The picture of the tree, for notebooks."""
+        return self.tree._repr_svg_()
+
 
 class Strategy(Protocol):
     """A planner: from a ground task and a target probability to a plan. Always returns."""

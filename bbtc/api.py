@@ -1,0 +1,241 @@
+"""What the commands do, as functions: ``import bbtc``, then ``bbtc.plan("domain.pddl", "problem.pddl")``.
+
+Wherever an input is wanted, the result of an earlier function does as well as the path of a file: a
+``Model`` or a ``Task`` to plan for, a ``Plan`` or a ``Tree`` to simulate and export. A path may be a
+``SourceFile``, too, for a text that is in no file. What is wrong is raised as
+:class:`~bbtc.diagnostics.BbtcError`, with every diagnostic of the run; what is merely doubtful goes to
+``report``, if one is given. Everything heavy is imported when it is used.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, TypeAlias
+
+from bbtc.diagnostics import Diagnostic, Report
+from bbtc.limits import Limits
+from bbtc.source import SourceFile
+
+if TYPE_CHECKING:
+    from bbtc.belief.scenarios import Scenario
+    from bbtc.belief.simulate import Figures
+    from bbtc.export.registry import Artefact
+    from bbtc.ground.task import Task
+    from bbtc.model.domain import Model
+    from bbtc.plan.bounds import TaskValue
+    from bbtc.plan.options import Retries
+    from bbtc.plan.result import Plan, Refinement
+    from bbtc.tree.nodes import Tree
+
+Source: TypeAlias = "str | os.PathLike[str] | SourceFile"
+"""The path of a file, or a text with the name it is shown under."""
+
+Probability: TypeAlias = "Fraction | float | str"
+"""An exact probability. A float stands for the decimal it prints as: 0.9 is nine tenths."""
+
+
+def load(*sources: Source, limits: Limits | None = None, report: Report | None = None) -> Model:
+    """The domain, and the problem if there is one, that files hold: names resolved, still lifted.
+
+    Doubts go to ``report``. Raises :class:`BbtcError` for files that cannot be read and with
+    everything that is wrong in them.
+    """
+    from bbtc import pipeline
+
+    report = Report() if report is None else report
+    documents = pipeline.parse_all(_read(sources, limits), report, limits)
+    report.raise_errors()
+    inputs = pipeline.select(documents, report)
+    report.raise_errors()
+    assert inputs is not None
+    return pipeline.resolve_model(inputs, report, checks=True)
+
+
+def check(*sources: Source, limits: Limits | None = None) -> list[Diagnostic]:
+    """Everything that is wrong or doubtful in domains and problems, in order of their places; each
+    problem is checked with the domain of its name. Raises :class:`BbtcError` only for files that
+    cannot be read."""
+    from bbtc import pipeline
+
+    report = Report()
+    documents = pipeline.parse_all(_read(sources, limits), report, limits)
+    if not report.errors:
+        pipeline.check_documents(documents, report)
+    return list(report)
+
+
+def format_text(source: Source) -> str:
+    """The text of a file in its canonical layout. Raises :class:`BbtcError` for syntax errors."""
+    from bbtc import pipeline
+
+    return pipeline.format_source(_read([source], None)[0])
+
+
+def compile(  # noqa: A001 - the name of the command
+    *inputs: Source | Model, limits: Limits | None = None, report: Report | None = None
+) -> Task:
+    """The ground task of a domain and a problem (or of a model that has both), or the one that a
+    compiled file holds.
+
+    Raises :class:`BbtcError` with everything that is wrong, and :class:`LimitReached`.
+    """
+    from bbtc import pipeline
+    from bbtc.model.domain import Model
+
+    report = Report() if report is None else report
+    limits = limits or Limits()
+    models = [each for each in inputs if isinstance(each, Model)]
+    if models:
+        if len(inputs) > 1:
+            raise TypeError("a model stands alone: it holds its domain and its problem")
+        return pipeline.ground_model(models[0], report, limits)
+    sources = _read([each for each in inputs if not isinstance(each, Model)], limits)
+    if not sources:
+        raise TypeError("give a domain and a problem, or a model")
+    return pipeline.task_of_sources(sources, report, limits)
+
+
+def plan(
+    *inputs: Source | Model | Task,
+    target: Probability | None = None,
+    strategy: str | None = None,
+    max_actions: int | None = None,
+    retries: Retries = "least",
+    limits: Limits | None = None,
+    report: Report | None = None,
+    progress: Callable[[Refinement], None] | None = None,
+) -> Plan:
+    """Plan a tree that reaches the goal with the target probability (default: the problem's own).
+
+    ``strategy`` is ``refine`` (the default), ``policy`` or ``auto``; ``max_actions`` bounds the actions of
+    every run; ``progress`` is told each refinement as it is made. The plan's ``tree.status`` says
+    whether the target was reached; falling short of it raises nothing. Raises :class:`BbtcError` for
+    input that is wrong and an unknown strategy, :class:`LimitReached` where the limits allow no
+    tree at all, and ``ValueError`` for a target that is no probability.
+    """
+    from bbtc import pipeline
+    from bbtc.plan.options import Options
+    from bbtc.plan.strategies import DEFAULT
+
+    limits = limits or Limits()
+    options = Options(max_actions=max_actions, retries=retries)
+    tell = progress or (lambda _: None)
+    task = _task(inputs, limits, report)
+    return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)
+
+
+def bounds(
+    *inputs: Source | Model | Task,
+    max_actions: int | None = None,
+    costs: bool = False,
+    limits: Limits | None = None,
+    report: Report | None = None,
+) -> TaskValue:
+    """The best probability that any policy can reach, between an upper and a lower bound; with
+    ``costs``, the least expected cost of reaching it so often, too. Raises as :func:`plan` does."""
+    from bbtc.plan.bounds import task_value
+    from bbtc.plan.options import Options
+
+    limits = limits or Limits()
+    return task_value(_task(inputs, limits, report), limits, Options(max_actions=max_actions), costs=costs)
+
+
+def load_tree(source: Source, *, limits: Limits | None = None) -> Tree:
+    """The tree that ``bbtc plan`` wrote. Raises :class:`BbtcError` with everything that is wrong."""
+    from bbtc.artefacts import load_tree as tree_from_text
+
+    return tree_from_text(_read([source], limits)[0])
+
+
+def dumps(value: Task | Tree | Plan) -> str:
+    """The JSON artefact of a task or a tree, as ``bbtc compile`` and ``bbtc plan`` write it."""
+    from bbtc import artefacts
+    from bbtc.ground.task import Task
+
+    if isinstance(value, Task):
+        return artefacts.dumps(artefacts.task_to_json(value))
+    return artefacts.dumps(artefacts.tree_to_json(_tree(value, None)))
+
+
+def simulate(tree: Source | Tree | Plan, *, limits: Limits | None = None) -> Figures:
+    """The exact figures of a tree: how probably it succeeds, why it fails, what it costs.
+
+    Raises :class:`BbtcError` for a file that is no tree, and :class:`LimitReached`.
+    """
+    from bbtc import pipeline
+
+    return pipeline.simulate_tree(_tree(tree, limits), limits or Limits())[0]
+
+
+def scenarios(tree: Source | Tree | Plan, count: int, *, limits: Limits | None = None) -> list[Scenario]:
+    """The most probable runs of a tree, at most ``count``. Raises as :func:`simulate` does."""
+    from itertools import islice
+
+    from bbtc import pipeline
+    from bbtc.belief.scenarios import scenarios as runs
+
+    return list(islice(runs(pipeline.simulate_tree(_tree(tree, limits), limits or Limits())[1]), count))
+
+
+def export(
+    tree: Source | Tree | Plan, to: str, *, limits: Limits | None = None, **options: bool | int | str
+) -> Artefact:
+    """The tree in an export format: text, or bytes where the format is binary. ``options`` are those
+    that ``bbtc export --list`` shows. Raises :class:`BbtcError` for an unknown format or option and
+    for a tree that the format cannot hold."""
+    from bbtc import pipeline
+
+    texts = {
+        name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in options.items()
+    }
+    return pipeline.export_tree(_tree(tree, limits), to, texts, limits or Limits())
+
+
+def explain(code: str) -> str:
+    """The page of a diagnostic's code, in Markdown. Raises ``KeyError`` for an unknown code."""
+    from bbtc.pages import page
+
+    return page(code)
+
+
+# --- inputs ----------------------------------------------------------------------------------
+
+
+def _read(sources: Sequence[Source], limits: Limits | None) -> list[SourceFile]:
+    from bbtc.syntax.reader import read_source
+
+    most = (limits or Limits()).file_bytes
+    return [s if isinstance(s, SourceFile) else read_source(os.fspath(s), most) for s in sources]
+
+
+def _task(inputs: Sequence[Source | Model | Task], limits: Limits, report: Report | None) -> Task:
+    from bbtc.ground.task import Task
+
+    tasks = [each for each in inputs if isinstance(each, Task)]
+    if not tasks:
+        rest = [each for each in inputs if not isinstance(each, Task)]
+        return compile(*rest, limits=limits, report=report)
+    if len(inputs) > 1:
+        raise TypeError("a task stands alone: it holds everything there is to plan for")
+    return tasks[0]
+
+
+def _tree(value: Source | Task | Tree | Plan, limits: Limits | None) -> Tree:
+    from bbtc.plan.result import Plan
+    from bbtc.tree.nodes import Tree
+
+    if isinstance(value, Tree):
+        return value
+    if isinstance(value, Plan):
+        return value.tree
+    if isinstance(value, str | os.PathLike | SourceFile):
+        return load_tree(value, limits=limits)
+    raise TypeError(f"no tree: {type(value).__name__}")
+
+
+def _exact(value: Probability | None) -> Fraction | None:
+    from bbtc.artefacts.numbers import parse_probability
+
+    return None if value is None else parse_probability(str(value))
