@@ -49,7 +49,7 @@ class FailureFinder:
         found = [
             Failing(node.id, self._condition(node, state), Status(status), self._depth[node.id])
             for node, status in reversed(self._seen)
-            if isinstance(node, ConditionNode) or node.guarded
+            if isinstance(node, ConditionNode) or self._lacks_precondition(node, state)
         ]
         return sorted(found, key=lambda f: (f.status != root, -f.depth))
 
@@ -60,13 +60,17 @@ class FailureFinder:
         for node, status in self._seen:
             if not isinstance(node, ActionNode) or status != Status.FAILURE:
                 continue
-            precondition = self._task.action_by_name[node.action].precondition
-            if node.guarded and evaluate(precondition, state.values) is not Truth.TRUE:
+            if self._lacks_precondition(node, state):
                 continue
             for counter in self._counters.get(node.id, ()):
                 if counter.used_up(state.finished):
                     return counter.node
         return None
+
+    def _lacks_precondition(self, node: ActionNode, state: State) -> bool:
+        """Is it guarded by a precondition that is not true? (If it is true, a retry node refused it.)"""
+        precondition = self._task.action_by_name[node.action].precondition
+        return node.guarded and evaluate(precondition, state.values) is not Truth.TRUE
 
     def _condition(self, node: ConditionNode | ActionNode, state: State) -> Condition:
         if isinstance(node, ConditionNode):

@@ -51,6 +51,12 @@ def test_the_figures_name_the_retry_whose_attempts_are_used_up() -> None:
     assert [(s.node, s.condition, s.status) for s in figures.failures] == [("again", None, Status.FAILURE)]
 
 
+def test_a_guarded_action_that_was_refused_lacks_no_precondition() -> None:
+    guarded = ActionNode("t", "throw()", latched=False, guarded=True)  # precondition: none
+    figures = simulate(coin(), until_heads(retry("again", 1, guarded)), Limits())
+    assert [(s.node, s.condition) for s in figures.failures] == [("again", None)]
+
+
 def test_conditions_below_a_retry_are_read_after_the_last_attempt() -> None:
     figures = simulate(coin(), retry("again", 2, until_heads(throw())), Limits())
     assert figures.success == Fraction(3, 4)
