@@ -16,7 +16,7 @@ from typing_extensions import assert_never
 from bbtc.export.btcpp_conditions import ConditionWriter
 from bbtc.export.btcpp_idioms import SKIPPER_LABEL, Idioms, Profile
 from bbtc.export.btcpp_names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
-from bbtc.export.btcpp_notes import notes, template_label
+from bbtc.export.btcpp_notes import TEMPLATE, notes
 from bbtc.export.btcpp_options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.export.btcpp_palette import node_model
 from bbtc.export.interface import action_symbol, guard_of, variable_symbol
@@ -24,6 +24,7 @@ from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.export.shape import fit, written
 from bbtc.ground.condition import TRUE, And, Condition, Or, variables
 from bbtc.ground.task import GroundAction, Task, ground_name, split_name
+from bbtc.tree.deep import Deep, unwind
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 
 ENGINE = "BehaviorTree.CPP"
@@ -74,6 +75,17 @@ class _Place:
         return replace(self, level=self.level + 1)
 
 
+@dataclass(frozen=True, slots=True)
+class _Hoisted:
+    """A BehaviorTree to make, unless there is one like it: its place among the others, and what its id
+    is made of."""
+
+    order: int
+    title: str
+    seed: str
+    description: str
+
+
 class _Writer:
     """Writes one document: BehaviorTrees are collected while the main tree is written."""
 
@@ -98,7 +110,7 @@ class _Writer:
         main = SubElement(document, "BehaviorTree", ID=main_id)
         main.set("_description", self._headline())
         root = fit(self.tree.root, ENGINE)
-        main.append(self.idioms.until_blocked(self._written(root, _Place(self.task.problem))))
+        main.append(self.idioms.until_blocked(unwind(self._written(root, _Place(self.task.problem)))))
         document.extend(tree for _, tree in sorted(self.parts.values(), key=lambda part: part[0]))
         document.extend(self.conditions.trees.values())
         document.extend(self.action_trees.values())
@@ -115,34 +127,36 @@ class _Writer:
 
     # --- nodes -------------------------------------------------------------------------------
 
-    def _written(self, node: Node, place: _Place) -> Element:
+    def _written(self, node: Node, place: _Place) -> Deep[Element]:
         if node.template is not None and place.template is not node:
-            return self._template(node, node.template, place)
+            templated: Element = yield self._template(node, node.template, place)
+            return templated
         match node:
             case ControlNode():
-                if place.level >= _DEEPEST_XML:
-                    return self._part(node, place)
-                element = self._control(node, place)
+                write = self._part if place.level >= _DEEPEST_XML else self._control
+                element: Element = yield write(node, place)
             case ConditionNode():
                 element = self._condition(node, place)
             case ActionNode():
                 element = self._action(node, place)
             case _:
                 assert_never(node)
-        if node.reason:
+        if node.reason and "_description" not in element.attrib:
             element.set("_description", f"for {shown(node.reason)}")
         return element
 
-    def _control(self, node: ControlNode, place: _Place) -> Element:
+    def _control(self, node: ControlNode, place: _Place) -> Deep[Element]:
         if node.attempts is not None:
             counter = self.idioms.counter(next(self.counters))
             inside = replace(place.down(), counters=(*place.counters, counter))
-            child = self._written(node.children[0], inside)
+            child: Element = yield self._written(node.children[0], inside)
             element = self.idioms.retry(counter, node.attempts, child)
             if node.name:
                 element.set("name", shown(node.name))
             return element
-        children = [self._written(child, place.down()) for child in node.children]
+        children: list[Element] = []
+        for each in node.children:
+            children.append((yield self._written(each, place.down())))  # noqa: PERF401
         element = self.idioms.control(node.kind, children)
         if node.name:
             element.set("name", shown(node.name))
@@ -150,37 +164,39 @@ class _Writer:
             element.set("name", SKIPPER_LABEL)
         return element
 
-    def _part(self, node: ControlNode, place: _Place) -> Element:
+    def _part(self, node: ControlNode, place: _Place) -> Deep[Element]:
         """A subtree in a BehaviorTree of its own, because it stands deep."""
-        order, title = next(self.order), f"{place.tree_title}Part"
-        content = self._written(node, replace(place, tree_title=title, level=0, labels=Labels()))
-        element = self._hoisted(order, title, node.id, content, tuple(place.binding.values()))
+        hoisted = _Hoisted(next(self.order), f"{place.tree_title}Part", node.id, "")
+        inside = replace(place, tree_title=hoisted.title, level=0, labels=Labels())
+        content: Element = yield self._written(node, inside)
+        element = self._call(hoisted, content, tuple(place.binding.values()))
         for port in place.binding.values():
             element.set(port, f"{{{port}}}")
         return element
 
-    def _template(self, node: Node, template: str, place: _Place) -> Element:
+    def _template(self, node: Node, template: str, place: _Place) -> Deep[Element]:
         """The expansion of a template: a BehaviorTree with its arguments as ports, which expansions that
         differ in nothing else share."""
-        order = next(self.order)
         symbol, args = split_name(template)
+        hoisted = _Hoisted(next(self.order), symbol, template, f"{TEMPLATE} {shown(symbol)}")
         binding = self._argument_ports(node, args)
         inside = _Place(symbol, counters=place.counters, binding=binding, template=node)
-        element = self._hoisted(order, symbol, template, self._written(node, inside), tuple(binding.values()))
-        element.set("name", place.labels.unique(template_label(template)))
+        content: Element = yield self._written(node, inside)
+        element = self._call(hoisted, content, tuple(binding.values()))
+        element.set("name", place.labels.unique(shown(template)))
         for arg, port in binding.items():
             element.set(port, self.conditions.value(arg, place.binding))
         return element
 
-    def _hoisted(
-        self, order: int, title: str, seed: str, content: Element, ports: tuple[str, ...]
-    ) -> Element:
+    def _call(self, hoisted: _Hoisted, content: Element, ports: tuple[str, ...]) -> Element:
         """A SubTree that calls a BehaviorTree with this content, which is made unless there is one."""
-        key = f"{title}\n{' '.join(ports)}\n".encode(errors="replace") + tostring(content)
+        key = repr((hoisted.title, ports)).encode() + tostring(content)
         if key not in self.parts:
-            tree = Element("BehaviorTree", ID=self.tree_ids.take(title, seed=seed))
+            tree = Element("BehaviorTree", ID=self.tree_ids.take(hoisted.title, seed=hoisted.seed))
+            if hoisted.description:
+                tree.set("_description", hoisted.description)
             tree.append(content)
-            self.parts[key] = order, tree
+            self.parts[key] = hoisted.order, tree
             self.subtree_ports[tree.attrib["ID"]] = ports
         return Element("SubTree", ID=self.parts[key][1].attrib["ID"])
 

@@ -29,6 +29,9 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, 
 MARK = " bbtc import reads here what the file cannot show:"
 """The first line of the comment."""
 
+TEMPLATE = "template"
+"""The first word of the description of a BehaviorTree that stands for a template."""
+
 VERSION = 1
 _WIDTH = 100
 
@@ -74,17 +77,6 @@ def kind_letter(node: Node) -> str:
             assert_never(node)
 
 
-def template_label(template: str) -> str:
-    """The name of the SubTree that stands for a template."""
-    return shown(template)
-
-
-def is_template_label(label: str) -> bool:
-    """Whether the name of a SubTree is that of a template, ``find(soda)``, rather than free text."""
-    head, bracket, tail = label.partition("(")
-    return bool(bracket and head) and " " not in head and tail.endswith(")")
-
-
 def _exact(task: Task, node: Node) -> dict[str, object]:
     """What reading the file would give a node in another form."""
     found: dict[str, object] = {}
@@ -105,10 +97,8 @@ def _exact(task: Task, node: Node) -> dict[str, object]:
             assert_never(node)
     if node.name is not None and not _reads_back(node.name, default):
         found["name"] = node.name
-    if node.template is not None:
-        label = without_number(shown(node.template))
-        if label != node.template or not is_template_label(label):
-            found["template"] = node.template
+    if node.template is not None and without_number(shown(node.template)) != node.template:
+        found["template"] = node.template
     if node.reason is not None and (shown(node.reason) != node.reason or not node.reason):
         found["reason"] = node.reason
     return found

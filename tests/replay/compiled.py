@@ -1,0 +1,201 @@
+"""BehaviorTree.CPP as a library: found by CMake, if it is there, and a driver compiled with it, which
+runs what only C++ can: the profile of our own control nodes, in any version."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+import pytest
+
+from bbtc.export.btcpp import btcpp
+from bbtc.export.btcpp_names import btcpp_names
+from bbtc.ground.task import ground_name
+from bbtc.tree.nodes import Tree
+from tests.replay.script import OffScript, Run, Script, ScriptedWorld, Timing
+
+REPOSITORY = Path(__file__).parents[2]
+NODES = REPOSITORY / "bbtc" / "export" / "cpp"
+SOURCES = Path(__file__).parent / "cpp"
+BUILDS = REPOSITORY / "build" / "cpp"
+
+
+def cmake_build(source: Path, build: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """Configure and build a CMake project; the result of the step that failed, or of the last."""
+    ninja = ["-G", "Ninja"] if shutil.which("ninja") else []
+    steps = (
+        ["cmake", "-S", str(source), "-B", str(build), "-DCMAKE_BUILD_TYPE=Debug", *ninja, *options],
+        ["cmake", "--build", str(build)],
+    )
+    for step in steps:
+        done = subprocess.run(step, capture_output=True, text=True, timeout=540, check=False)
+        if done.returncode != 0:
+            break
+    return done
+
+
+@functools.cache
+def missing_library() -> str | None:
+    """Why nothing can be compiled with BehaviorTree.CPP here; None if it can."""
+    for program in ("cmake", "c++"):
+        if shutil.which(program) is None:
+            return f"no {program} on the PATH"
+    options = ["NAME=behaviortree_cpp", "COMPILER_ID=GNU", "LANGUAGE=CXX", "MODE=EXIST", *_prefix()]
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            ["cmake", "--find-package", *(f"-D{option}" for option in options)],
+            cwd=folder,
+            capture_output=True,
+            check=False,
+        )
+    if done.returncode != 0:
+        return "CMake finds no BehaviorTree.CPP: set CMAKE_PREFIX_PATH to where 4.6 or later is installed"
+    return None
+
+
+def _prefix() -> Iterator[str]:
+    # --find-package does not read the environment variable in every version.
+    if "CMAKE_PREFIX_PATH" in os.environ:
+        yield f"CMAKE_PREFIX_PATH={os.environ['CMAKE_PREFIX_PATH'].replace(os.pathsep, ';')}"
+
+
+def require_library() -> None:
+    """Skip the test where nothing can be compiled with BehaviorTree.CPP."""
+    reason = missing_library()
+    if reason is not None:
+        pytest.skip(reason)
+
+
+@functools.cache
+def driver() -> Path:
+    """The folder with ``driver`` and the plugin of our nodes, compiled once for a state of the sources
+    and a library."""
+    digest = hashlib.sha256(os.environ.get("CMAKE_PREFIX_PATH", "").encode())
+    for file in sorted([*SOURCES.iterdir(), *NODES.iterdir()]):
+        if file.is_file():
+            digest.update(file.read_bytes())
+    folder = BUILDS / digest.hexdigest()[:16]
+    if not (folder / "driver").exists():
+        BUILDS.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=BUILDS) as scratch:
+            done = cmake_build(SOURCES, Path(scratch) / "made", f"-DBBTC_NODES={NODES}")
+            assert done.returncode == 0, done.stdout + done.stderr
+            try:
+                (Path(scratch) / "made").rename(folder)
+            except OSError:  # another process of this test run was first
+                assert (folder / "driver").exists()
+    return folder
+
+
+class CompiledReplay:
+    """The exported XML of a tree in the compiled driver, for any number of scripts. :attr:`world` is
+    that of the last one. Close it, or use it as a context."""
+
+    profile: Literal["stock", "bbtc"] = "bbtc"
+    namespace = "Test"
+
+    def __init__(self, tree: Tree) -> None:
+        self._task = tree.task
+        names = btcpp_names(tree, self.namespace)
+        options = {"nodes": self.profile, "namespace": self.namespace}
+        self.source = btcpp.export(tree, options, None)
+        self.world: ScriptedWorld | None = None
+        self._symbols = {node_id: symbol for symbol, node_id in names.ids.items()}
+        self._objects = {value: name for name, value in names.values.items()}
+        self._folder = tempfile.TemporaryDirectory()
+        file = Path(self._folder.name) / "tree.xml"
+        file.write_text(self.source, encoding="utf-8")
+        main = self.source.split('main_tree_to_execute="')[1].split('"')[0]
+        nodes = [
+            f"{kind}:{names.ids[leaf.symbol]}:{','.join(leaf.parameters)}"
+            for kind, found in (
+                ("condition", names.interface.conditions),
+                ("action", names.interface.actions),
+            )
+            for leaf in found
+        ]
+        built = driver()
+        plugin = next(file for file in built.iterdir() if file.name.startswith("libbbtc_nodes."))
+        self._process = subprocess.Popen(
+            [built / "driver", plugin, file, main, *nodes],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+        )
+        self._waiting = False
+
+    def close(self) -> None:
+        """End the driver."""
+        self._process.kill()
+        self._process.communicate()
+        self._folder.cleanup()
+
+    def __enter__(self) -> CompiledReplay:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def run(self, script: Script, timing: Timing = "between") -> Run:
+        """Replay one script in a new instance of the tree."""
+        world = self.world = ScriptedWorld(self._task, script, timing)
+        if self._waiting:
+            self._answer("0")
+        for _ in range(world.most_ticks()):
+            status = self._tick(world)
+            if status == "3":
+                return Run(tuple(world.actions), "cut", world.values)
+            if status != "1":
+                return Run(tuple(world.actions), "success" if status == "2" else "failure", world.values)
+            world.between_ticks()
+            if _ + 1 < world.most_ticks():
+                self._answer("1")
+        return Run(tuple(world.actions), "endless", world.values)
+
+    def _tick(self, world: ScriptedWorld) -> str:
+        """Answer the questions of a tick; its status."""
+        self._waiting = False
+        assert self._process.stdout is not None
+        while True:
+            line = self._process.stdout.readline()
+            assert line, f"the driver ended: {self._process.wait()}"
+            kind, *rest = line.split()
+            if kind == "T":
+                self._waiting = True
+                return rest[0]
+            try:
+                self._answer(self._reply(world, kind, rest))
+            except OffScript:
+                self._answer("x")
+
+    def _reply(self, world: ScriptedWorld, kind: str, rest: list[str]) -> str:
+        node = rest[0]
+        if kind == "H":
+            world.cancel(node)
+            return "0"
+        if kind == "G":
+            return "2" if world.go_on(node) else "1"
+        symbol = self._symbols[rest[1]]
+        name = ground_name(symbol.name, tuple(self._objects[value] for value in rest[2:]))
+        if kind == "C":
+            return str(world.read(name))
+        return "2" if world.start(name, node) else "1"
+
+    def _answer(self, text: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{text}\n")
+        self._process.stdin.flush()
+
+
+class CompiledStockReplay(CompiledReplay):
+    """The same with stock nodes only."""
+
+    profile = "stock"
