@@ -50,6 +50,8 @@ CODES: dict[str, str] = {
     "BBT0222": "derived predicate depends on its own negation",
     "BBT0223": "initial fact with two values",
     "BBT0224": "foreach without a node around it",
+    "BBT0225": "name that is not declared",
+    "BBT0226": "section given twice",
     # 03xx: checks
     "BBT0301": "unused predicate",
     "BBT0302": "unreachable action",

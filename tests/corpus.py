@@ -2,9 +2,9 @@
 
 A file is *accepted* if it parses, resolves (a problem with each partner that ``PAIRS.tsv`` gives it), and
 prints to a text that holds all it held. It is *rightly refused* if ``ODDITIES.tsv`` lists it, or if every
-error names a construct the language does not have, or a name that its texts, as read here, declare
-nowhere, or if it stands or falls with a partner that is rightly refused. Anything else is *wrong*. What a
-text holds and declares is read here, from parentheses and words, without our parser.
+error names a construct the language does not have, or if it stands or falls with a partner that is rightly
+refused. Anything else is *wrong*. What a text holds is read here, from parentheses and words, without our
+parser.
 
 ``--every N`` takes each Nth file of a family only; ``--list`` names the files that are not accepted.
 """
@@ -21,7 +21,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
-from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
 
@@ -46,13 +45,6 @@ REQUIRED = {
 
 UNSUPPORTED = "BBT0212"
 """The code of a construct that is refused by name."""
-
-UNDECLARED = {
-    "BBT0201": (":types",),
-    "BBT0202": (":predicates", ":derived"),
-    "BBT0203": (":constants", ":objects"),
-}
-"""The codes of errors about names that are declared nowhere, and the sections that declare such names."""
 
 # --- what a text holds, read without our parser ----------------------------------------------
 
@@ -154,7 +146,7 @@ def _difference(one: Counter[_T], other: Counter[_T]) -> str:
 
 @dataclass(frozen=True)
 class Verdict:
-    """``kind`` is accepted, malformed, undeclared, unsupported or wrong."""
+    """``kind`` is accepted, malformed, unsupported or wrong."""
 
     path: str
     kind: str
@@ -251,40 +243,10 @@ def _refused(corpus: Corpus, path: str, diagnostics: Sequence[Diagnostic]) -> Ve
     own = [d for d in errors if d.span is None or d.span.source.name == str(corpus.folder / path)]
     if not own and any(partner in corpus.odd for partner in corpus.partners.get(path, ())):
         return Verdict(path, "malformed", why)
-    texts = [(corpus.folder / each).read_text("latin-1") for each in (path, *corpus.partners.get(path, ()))]
-    undeclared = [d for d in errors if d.code in UNDECLARED and _is_undeclared(d, texts)]
-    wrong = [d for d in errors if d.code != UNSUPPORTED and d not in undeclared]
+    wrong = [d for d in errors if d.code != UNSUPPORTED]
     if wrong:
         return Verdict(path, "wrong", wrong[0].render().splitlines()[0].replace(f"{corpus.folder}/", ""))
-    return Verdict(path, "undeclared" if undeclared else "unsupported", why)
-
-
-def _is_undeclared(error: Diagnostic, texts: Sequence[str]) -> bool:
-    """Whether the name that the error is about really stands in none of the sections that declare such."""
-    match = re.search("`([^`]+)`", error.message)
-    if match is None:
-        return False
-    kinds = UNDECLARED[error.code]
-    return not any(match.group(1).lower() in declared(text, kinds) for text in texts)
-
-
-def declared(text: str, kinds: tuple[str, ...]) -> set[str]:
-    """Every word of the sections of the given kinds: the names they declare, and more."""
-    words: set[str] = set()
-    depth, inside = 0, 0
-    tokens = _TOKEN.findall(_COMMENT.sub("", text).lower())
-    for before, token in pairwise(["", *tokens]):
-        depth += (token == "(") - (token == ")")
-        if before == "(" and token in kinds:
-            inside = depth
-        elif depth < inside:
-            inside = 0
-        elif inside:
-            # Past the `-` stands a type, which is used, not declared; `predicates` declare heads only.
-            if before == "-" or (":predicates" in kinds and before != "("):
-                continue
-            words.add(token)
-    return words
+    return Verdict(path, "unsupported", why)
 
 
 # --- the report ------------------------------------------------------------------------------
@@ -328,12 +290,12 @@ def tallies(corpus: Corpus, every: int = 1, workers: int = 1) -> list[Tally]:
 
 def table(found: Iterable[Tally]) -> str:
     """The report as text, a line for each family."""
-    lines = ["family           files  accepted  malformed  undeclared  unsupported  wrong   share  required"]
+    lines = ["family           files  accepted  malformed  unsupported  wrong   share  required"]
     for tally in found:
         required = REQUIRED.get(tally.family)
         lines.append(
             f"{tally.family:<17}{len(tally.verdicts):>5}{tally.count('accepted'):>10}"
-            f"{tally.count('malformed'):>11}{tally.count('undeclared'):>12}{tally.count('unsupported'):>13}{tally.count('wrong'):>7}"
+            f"{tally.count('malformed'):>11}{tally.count('unsupported'):>13}{tally.count('wrong'):>7}"
             f"{float(tally.share):>8.1%}  {f'{float(required):.0%}' if required else '-':>8}"
         )
     return "\n".join(lines)

@@ -52,11 +52,3 @@ def test_a_change_of_layout_loses_nothing(before: str, after: str) -> None:
 def test_probabilities_are_counted_without_the_parser() -> None:
     content = report.content_of("(probabilistic 1/2 (a) .25 (probabilistic 1e-1 b))")
     assert content.probabilities == {Fraction(1, 2): 1, Fraction(1, 4): 1, Fraction(1, 10): 1}
-
-
-def test_declarations_are_read_without_the_parser() -> None:
-    text = "(:types a b - c) (:predicates (p ?x - d) (q)) (:objects o - a ; no\n u - a)"
-    assert report.declared(text, (":types",)) >= {"a", "b"}
-    assert "d" not in report.declared(text, (":types",))
-    assert report.declared(text, (":predicates",)) == {"p", "q"}
-    assert report.declared(text, (":objects",)) == {"o", "u", "-"}

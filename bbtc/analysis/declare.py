@@ -23,6 +23,7 @@ def sections(definition: ast.Definition, kind: type[S]) -> Iterator[S]:
 def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None) -> None:
     """Fill ``names`` with the declarations of both definitions."""
     names.hierarchy = _types(names, domain)
+    names.derived = frozenset(rule.head.predicate.key for rule in sections(domain, ast.Derived))
     for definition in (domain, problem) if problem is not None else (domain,):
         for section in sections(definition, ast.TypedSection):
             if section.kind != "types":
@@ -81,39 +82,12 @@ def _types(names: Names, domain: ast.Definition) -> TypeHierarchy:
     for above in list(parents.values()):
         for key, parent in above.items():
             found.setdefault(key, Type(key, (), parent.span))
-    if not parents:
-        _implied(names, domain, found)
     found[OBJECT] = Type(OBJECT, (), found[OBJECT].span if OBJECT in found else None)
     parents[OBJECT] = {}
     _refuse_cycles(names, parents, found)
     return TypeHierarchy(
         {key: Type(key, tuple(parents.get(key, ())), type_.span) for key, type_ in found.items()}
     )
-
-
-def _implied(names: Names, domain: ast.Definition, found: dict[str, Type]) -> None:
-    """A domain without any ``:types`` that uses types all the same: each is read as declared."""
-    groups: list[ast.TypedGroup] = []
-    for section in domain.sections:
-        match section:
-            case ast.TypedSection(_, entries):
-                groups.extend(entries)
-            case ast.Predicates(declarations):
-                groups.extend(group for each in declarations for group in each.parameters)
-            case ast.Action() | ast.Template():
-                groups.extend(section.parameters)
-            case _:
-                pass
-    for group in groups:
-        for name in group.types:
-            if name.key != OBJECT and name.key not in found:
-                found[name.key] = Type(name.key, (), name.span)
-                names.report.warning(
-                    "BBT0201",
-                    f"type `{name.text}` is not declared",
-                    name.span,
-                    "the domain has no `:types`, so every type that it uses is taken as one",
-                )
 
 
 def _refuse_own_parent(names: Names, group: ast.TypedGroup, name: ast.Term) -> None:
@@ -159,6 +133,7 @@ def _refuse_cycles(names: Names, parents: dict[str, dict[str, ast.Name]], found:
 
 
 def _objects(names: Names, section: ast.TypedSection) -> None:
+    names.section = "objects"
     kind = "constant" if section.kind == "constants" else "object"
     objects = names.objects
     for group in section.entries:
@@ -176,7 +151,6 @@ def _objects(names: Names, section: ast.TypedSection) -> None:
 
 def _predicates(names: Names, domain: ast.Definition) -> None:
     names.section = "predicates"
-    derived = {rule.head.predicate.key for rule in sections(domain, ast.Derived)}
     for section in sections(domain, ast.Predicates):
         for node in section.declarations:
             key = node.name.key
@@ -187,7 +161,7 @@ def _predicates(names: Names, domain: ast.Definition) -> None:
                 key,
                 names.parameters(node.parameters),
                 declared_three_valued=node.three_valued,
-                derived=key in derived,
+                derived=key in names.derived,
                 span=node.name.span,
             )
             before = names.predicates.setdefault(key, predicate)

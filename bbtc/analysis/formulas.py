@@ -61,9 +61,8 @@ def atom(names: Names, node: ast.Atom, scope: Scope) -> mf.Atom | None:
 def _predicate_args(
     names: Names, name: ast.Name, args: Sequence[ast.Term], span: Span, scope: Scope
 ) -> tuple[mf.Term, ...] | None:
-    predicate = names.predicates.get(name.key)
+    predicate = names.predicate(name, args)
     if predicate is None:
-        names.unknown("BBT0202", "predicate", name, names.predicates)
         for arg in args:
             names.term(arg, scope)
         return None
@@ -74,7 +73,7 @@ def formula(names: Names, node: ast.Formula, scope: Scope) -> mf.Formula:
     """A condition; parts with errors, which are reported, count as true."""
     match node:
         case ast.Atom():
-            return atom(names, node, scope) or mf.ALWAYS
+            return names.type_test(node, scope) or atom(names, node, scope) or mf.ALWAYS
         case ast.Empty():
             return mf.ALWAYS
         case ast.Equality(left, right, span):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
+from bbtc.analysis.undeclared import Uses, likely, slip, uses_of
 from bbtc.diagnostics import Related, Report
 from bbtc.model.domain import Function, Predicate
-from bbtc.model.formula import Term
+from bbtc.model.formula import Equal, Formula, Quantified, Term
 from bbtc.model.types import OBJECT, Object, Parameter, Type, TypeHierarchy
 from bbtc.source import Span
 from bbtc.syntax import ast
@@ -17,6 +19,8 @@ from bbtc.syntax import ast
 Scope = Mapping[str, Parameter]
 _NO_TYPE = ""
 """Stands for a type that is not known, which has been reported: it fits everything."""
+_TOLD = 10
+"""How many undeclared names of a kind are told one by one."""
 
 
 class Declared(Protocol):
@@ -26,6 +30,9 @@ class Declared(Protocol):
     def name(self) -> str: ...
     @property
     def span(self) -> Span | None: ...
+
+
+_D = TypeVar("_D", bound=Declared)
 
 
 class Parameterised(Declared, Protocol):
@@ -59,7 +66,17 @@ class Names:
     costs: frozenset[str] = frozenset({"total-cost"})
     rewards: frozenset[str] = frozenset({"reward"})
     section: str = ""
+    definitions: tuple[ast.Definition, ...] = ()
+    derived: frozenset[str] = frozenset()
+    """Keys of the predicates that have rules."""
+    in_problem: bool = False
+    """What is being read is the problem's."""
     _told: set[tuple[str, str, str]] = field(default_factory=set)
+    _inferred: dict[tuple[str, str], None] = field(default_factory=dict)
+    """Kind and key of what is taken as declared."""
+    _counts: Counter[str] = field(default_factory=Counter)
+    _told_in_sum: dict[str, ast.Term] = field(default_factory=dict)
+    _uses: Uses | None = None
 
     def unknown(self, code: str, kind: str, name: ast.Term, known: Mapping[str, Declared]) -> None:
         """Report a name that nothing declares, with the nearest one that is."""
@@ -67,18 +84,135 @@ class Names:
         if (self.section, kind, key) in self._told:
             return
         self._told.add((self.section, kind, key))
-        near = nearest(key, known)
+        near = slip(key, known) or nearest(key, known)
         hint: str | None = None
         related: list[Related] = []
         if near is not None:
             hint = f"did you mean `{near}`?"
             if known[near].span is not None:
-                related = [Related(f"`{near}` is declared here", known[near].span)]
+                related = [self._declared_here(kind, known[near])]
         elif not known:
             hint = f"no {kind} is declared"
         elif len(known) <= 8:
             hint = "declared: " + ", ".join(f"`{name}`" for name in known)
         self.report.error(code, f"unknown {kind} `{name.text}`", name.span, hint, related)
+
+    # --- what is taken as declared -------------------------------------------------------
+
+    @property
+    def uses(self) -> Uses:
+        """Where names stand; found when first asked for, since most files declare what they use."""
+        if self._uses is None:
+            self._uses = uses_of(self.definitions)
+        return self._uses
+
+    def _stands_alone(self, key: str) -> bool:
+        """Does the name of a predicate or an object stand in one action, rule, `:init` or the like only?"""
+        return len(self.uses.names.get(key, ())) < 2
+
+    def _declared_here(self, kind: str, declared: Declared) -> Related:
+        word = "first used" if (kind, declared.name) in self._inferred else "declared"
+        return Related(f"`{declared.name}` is {word} here", declared.span)
+
+    def _declared(self, kind: str, known: Mapping[str, _D]) -> dict[str, _D]:
+        """Those of the known names that are declared, not inferred."""
+        return {key: each for key, each in known.items() if (kind, key) not in self._inferred}
+
+    def _infer(self, kind: str, name: ast.Term, reading: str, near: str | None = None) -> None:
+        """Say that a name is taken as declared, and as what."""
+        self._inferred[kind, name.key] = None
+        self._counts[kind] += 1
+        if self._counts[kind] > _TOLD:
+            self._told_in_sum[kind] = name
+            return
+        hint = reading if near is None else f"{reading}; did you mean `{near}`?"
+        self.report.warning("BBT0225", f"{kind} `{name.text}` is not declared", name.span, hint)
+
+    def finish(self) -> None:
+        """Count what is taken as declared beyond the names that were told one by one."""
+        for kind, name in self._told_in_sum.items():
+            more = self._counts[kind] - _TOLD
+            self.report.warning(
+                "BBT0225",
+                f"{more} more {kind}s are not declared, `{name.text}` the last of them"
+                if more > 1
+                else f"{kind} `{name.text}` is not declared",
+                name.span,
+                "they are taken as the ones above" if more > 1 else "it is taken as the ones above",
+            )
+
+    def predicate(self, name: ast.Name, args: Sequence[ast.Term]) -> Predicate | None:
+        """The predicate of a name. One that is not declared is inferred from its use, or is an error where
+        it seems misspelt, or where nothing gives it a value and one section alone reads it."""
+        key = name.key
+        found = self.predicates.get(key)
+        if found is not None:
+            return found
+        known = self._declared("predicate", self.predicates)
+        alike = {each: p for each, p in known.items() if len(p.parameters) == len(args)}
+        near, alone = slip(key, alike), self._stands_alone(key)
+        if (alone and (near is not None or key not in self.uses.given)) or key in self.hierarchy.types:
+            self.unknown("BBT0202", "predicate", name, known)
+            return None
+        parameters = tuple(Parameter(f"?{number}") for number in range(1, len(args) + 1))
+        self.predicates[key] = Predicate(key, parameters, derived=key in self.derived, span=name.span)
+        where = f"with {_count(len(args))}" if args else "without arguments"
+        self._infer("predicate", name, f"it is taken as a predicate {where}", near)
+        return self.predicates[key]
+
+    def _inferred_object(self, name: ast.Name, types: tuple[str, ...]) -> bool:
+        """Take a name that actions use as a constant of the type that its place has. In a problem, where the
+        objects are listed, it is an error, and so is a name that seems misspelt."""
+        key = name.key
+        if self.in_problem or len(types) > 1 or _NO_TYPE in types:
+            return False
+        known = self._declared("object", self.objects)
+        near = slip(key, known)
+        if key in known or (near is not None and self._stands_alone(key)):
+            return False
+        before = self.objects.get(key)
+        if before is None:
+            self._infer("object", name, f"it is taken as a constant of type {type_words(types)}", near)
+            self.objects[key] = Object(key, types, name.span)
+        elif not self.hierarchy.contains(types, before):
+            self.objects[key] = Object(key, tuple(dict.fromkeys((*before.types, *types))), before.span)
+        return True
+
+    def _inferred_type(self, name: ast.Name) -> str:
+        """The type that an undeclared name stands for: itself, taken as declared; ``object`` if nothing has
+        it but the place of a predicate, where a type only says what may stand there; none after reporting
+        what seems misspelt, or a type that one action alone knows."""
+        key = name.key
+        known = {k: t for k, t in self._declared("type", self.hierarchy.types).items() if k != OBJECT}
+        near, alone = slip(key, known), len(self.uses.types[key]) < 2
+        if self.section in {"predicates", "functions"} and key not in self.uses.bound:
+            if ("type", key) not in self._inferred:
+                self._infer("type", name, "anything is taken to fit here", near)
+            return OBJECT
+        idle = bool(known) and self.section != "objects"
+        if not alone or (near is None and not idle):
+            self._infer("type", name, "it is taken as a type without supertype", near)
+            added = {key: Type(key, (), name.span)}
+            self.hierarchy = TypeHierarchy({**self.hierarchy.types, **added})
+            return key
+        self.unknown("BBT0201", "type", name, known)
+        return _NO_TYPE
+
+    def type_test(self, atom: ast.Atom, scope: Scope) -> Formula | None:
+        """``(room ?x)``, with the name of a type and not of a predicate: ``?x`` is of that type."""
+        key = atom.predicate.key
+        if key in self.predicates or key == OBJECT or len(atom.args) != 1 or key not in self.hierarchy.types:
+            return None
+        found = self.term(atom.args[0], scope)
+        if found is None:
+            return None
+        if ("predicate", key) not in self._inferred:
+            self._infer("predicate", atom.predicate, f"it is taken as a test for the type `{key}`")
+        fresh = f"?{key}'"
+        while fresh in {parameter.name for parameter in scope.values()}:
+            fresh += "'"
+        same = Equal(found[0], fresh, atom.span)
+        return Quantified("exists", (Parameter(fresh, (key,), atom.span),), same, atom.span)
 
     # --- types ---------------------------------------------------------------------------
 
@@ -89,9 +223,7 @@ class Names:
             if name.key in self.hierarchy.types:
                 found[name.key] = None
             else:
-                known = {key: type_ for key, type_ in self.hierarchy.types.items() if key != OBJECT}
-                self.unknown("BBT0201", "type", name, known)
-                found[_NO_TYPE] = None
+                found[self._inferred_type(name)] = None
         return tuple(found) or (OBJECT,)
 
     def parameters(self, groups: ast.TypedList) -> tuple[Parameter, ...]:
@@ -113,8 +245,11 @@ class Names:
 
     # --- terms ---------------------------------------------------------------------------
 
-    def term(self, term: ast.Term, scope: Scope) -> tuple[Term, tuple[str, ...]] | None:
-        """A term and its types, or None after reporting that it is unknown."""
+    def term(
+        self, term: ast.Term, scope: Scope, wanted: tuple[str, ...] = (OBJECT,)
+    ) -> tuple[Term, tuple[str, ...]] | None:
+        """A term and its types, or None after reporting that it is unknown. ``wanted`` are the types of its
+        place."""
         key = term.key
         if isinstance(term, ast.Variable):
             parameter = scope.get(key)
@@ -122,6 +257,8 @@ class Names:
                 return parameter.name, parameter.types
             self.unknown("BBT0204", "parameter", term, scope)
             return None
+        if key not in self.objects or ("object", key) in self._inferred:
+            self._inferred_object(term, wanted)
         thing = self.objects.get(key)
         if thing is not None:
             return key, thing.types
@@ -146,14 +283,14 @@ class Names:
                 f"{kind} `{shown}` takes {_count(len(parameters))}, not {len(args)}",
                 span,
                 f"write it as `{written(declared.name, parameters)}`",
-                [Related(f"`{declared.name}` is declared here", declared.span)],
+                [self._declared_here(kind, declared)],
             )
             for arg in args:
                 self.term(arg, scope)
             return None
         result: list[Term] = []
         for position, (arg, parameter) in enumerate(zip(args, parameters, strict=True), 1):
-            found = self.term(arg, scope)
+            found = self.term(arg, scope, parameter.types)
             if found is None:
                 continue
             if not self._fits(arg, found[1], parameter.types):
@@ -162,7 +299,7 @@ class Names:
                     f"argument {position} of {kind} `{shown}` must be {type_words(parameter.types)}, "
                     f"but `{arg.text}` is {type_words(found[1])}",
                     arg.span,
-                    related=[Related(f"`{declared.name}` is declared here", declared.span)],
+                    related=[self._declared_here(kind, declared)],
                 )
                 continue
             result.append(found[0])
@@ -180,11 +317,7 @@ class Names:
 
 def nearest(key: str, known: Iterable[str]) -> str | None:
     """The known name closest in spelling, if one is close."""
-    # Spelling distance is quadratic: on a very large problem look at likely names only.
-    names = list(known)
-    if len(names) > 2000:
-        names = [name for name in names if name[:1] == key[:1] and abs(len(name) - len(key)) <= 2][:2000]
-    matches = difflib.get_close_matches(key[:100], names, 1, 0.7)
+    matches = difflib.get_close_matches(key[:100], likely(key, known), 1, 0.7)
     return matches[0] if matches else None
 
 

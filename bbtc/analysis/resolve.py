@@ -22,6 +22,9 @@ from bbtc.source import Span
 from bbtc.syntax import ast
 
 _PROBLEM_ONLY = (ast.Init, ast.Goal, ast.GoalNumber, ast.Metric, ast.DomainReference, ast.Hidden)
+_LISTS = (ast.Requirements, ast.TypedSection, ast.Predicates, ast.Functions, ast.Hidden)
+_SEVERAL = (ast.Action, ast.Derived, ast.Sensor, ast.Template)
+"""What a domain has several of; of everything else one section is enough."""
 _DOMAIN_ONLY = (ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template)
 
 
@@ -32,7 +35,8 @@ def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Repo
     sum differs from 1 by at most 1e-9 are taken as rounded and divided by their sum; a smaller sum
     gets an explicit no-change branch.
     """
-    names = Names(report)
+    definitions = (domain,) if problem is None else (domain, problem)
+    names = Names(report, definitions=definitions)
     _check_sections(report, domain, problem)
     declare(names, domain, problem)
     schemas: dict[str, md.Schema] = {}
@@ -69,7 +73,8 @@ def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Repo
     )
     if problem is not None:
         model = _with_problem(names, model, domain, problem)
-    model = replace(model, predicates=_three_valued(model))
+    names.finish()
+    model = replace(model, types=names.hierarchy, predicates=_three_valued(model))
     return None if report.errors else model
 
 
@@ -91,20 +96,27 @@ def _check_sections(report: Report, domain: ast.Definition, problem: ast.Definit
                 isinstance(section, ast.TypedSection) and section.kind == "types" and other == "domain"
             ):
                 report.error("BBT0221", f"this section belongs in a {other}", section.span)
-            elif isinstance(section, (ast.Goal, ast.GoalNumber, ast.Metric, ast.Init, ast.DomainReference)):
-                kind = section.kind if isinstance(section, ast.GoalNumber) else _section_name(section)
-                if kind in seen:
-                    report.error(
-                        "BBT0208",
-                        f"`:{kind}` is given twice",
-                        section.span,
-                        related=[Related("first given here", seen[kind].span)],
-                    )
-                seen.setdefault(kind, section)
+            elif not isinstance(section, _SEVERAL):
+                kind = _section_name(section)
+                first = seen.setdefault(kind, section)
+                if first is not section:
+                    _twice(report, kind, section, first)
 
 
-def _section_name(section: ast.Goal | ast.Metric | ast.Init | ast.DomainReference) -> str:
+def _section_name(section: ast.Section) -> str:
+    if isinstance(section, (ast.GoalNumber, ast.TypedSection)):
+        return section.kind
     return "domain" if isinstance(section, ast.DomainReference) else type(section).__name__.lower()
+
+
+def _twice(report: Report, kind: str, section: ast.Section, first: ast.Section) -> None:
+    """A second list adds to the first; of two goals or the like, neither is the one that is meant."""
+    message, related = f"`:{kind}` is given twice", [Related("first given here", first.span)]
+    if isinstance(section, _LISTS):
+        hint = "what both of them list is read; one section would say so"
+        report.warning("BBT0226", message, section.span, hint, related)
+    else:
+        report.error("BBT0208", message, section.span, related=related)
 
 
 # --- the domain ------------------------------------------------------------------------------
@@ -137,7 +149,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
 def _rule(names: Names, node: ast.Derived) -> md.Rule:
     names.section = f"derived {node.head.predicate.key}"
     # The head's own types bind: parameters of the head are often written without any.
-    predicate = names.predicates.get(node.head.predicate.key)
+    predicate = names.predicate(node.head.predicate, node.head.args)
     declared = (
         {}
         if predicate is None
@@ -282,7 +294,7 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
                 reference.name.span,
                 related=[Related("the domain given with it", domain.name.span)],
             )
-    names.section = "init"
+    names.section, names.in_problem = "init", True
     init = initial(names, list(sections(problem, ast.Init)))
     for hidden in sections(problem, ast.Hidden):
         for fact in hidden.facts:

@@ -1,0 +1,16 @@
+(define (domain house)
+  (:types room)
+  (:constants hall - room)
+  (:predicates (at ?r - room) (lit ?r - room) (cleaned ?r - room))
+  (:action go
+    :parameters (?r - romo ?d - door)
+    :precondition (cleand ?r)
+    :effect (at hal))
+  (:action stay
+    :precondition (and (warm) (lamp))
+    :effect (and (lti hall) (room hall))))
+(define (problem p)
+  (:domain house)
+  (:objects kitchen - room)
+  (:init (at cellar))
+  (:goal (and (lamp) (bought milk) (at kitchne))))

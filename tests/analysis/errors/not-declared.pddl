@@ -1,0 +1,16 @@
+(define (domain house)
+  (:types room)
+  (:predicates (at ?r - room) (lit ?r - romo) (safeX ?r - room))
+  (:derived (bright ?r) (lit ?r))
+  (:action go
+    :parameters (?r - room)
+    :precondition (safe ?r)
+    :effect (and (at ?r) (locked) (forall (?d - door) (shut ?d))))
+  (:action stay
+    :precondition (and (safe hall) (at hall) (= hall hall))
+    :effect (and (locked) (forall (?r - room) (when (and (room ?r) (bright ?r)) (lit ?r))))))
+(define (problem p)
+  (:domain house)
+  (:objects front - door kitchen1 - room)
+  (:init (safe kitchen1) (k_at kitchen1) (oven kitchen1))
+  (:goal (and (locked) (shut front) (oven kitchen1))))
