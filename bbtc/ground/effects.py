@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import pairwise, repeat
+from operator import lt
+from typing import cast
 
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
 from bbtc.ground.atoms import Atoms
+from bbtc.ground.bulk import Shared, instances
 from bbtc.ground.condition import FALSE, TRUE, Condition
-from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin
-from bbtc.ground.normal import Block, Chance, Item, free
+from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
+from bbtc.ground.normal import Block, Chance, Item, free, reads
 from bbtc.ground.task import Effect, Factor, Outcome
+from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -115,6 +120,13 @@ class EffectLowering:
         self.atoms: Atoms = lowering.atoms
         self.report = report
 
+    def reached(
+        self, block: Block, parameters: tuple[Parameter, ...]
+    ) -> Shared[tuple[tuple[Factor, ...], Fraction]]:
+        """:meth:`LoweredEffect.factors` for many argument rows of an action."""
+        used, frame = projection(self.lowering.universe, parameters, reads(block))
+        return Shared(used, len(parameters), self.effect(block, frame).all)
+
     def effect(self, block: Block, frame: Frame) -> LoweredEffect:
         """The effect of an action or of a template's guide."""
         return LoweredEffect(self, block, frame)
@@ -125,8 +137,10 @@ class LoweredEffect:
 
     def __init__(self, owner: EffectLowering, block: Block, frame: Frame) -> None:
         self._owner = owner
+        self._frame = frame
         self._pairs = owner.atoms.pairs
-        self._plain: list[tuple[Callable[[Env], int | None], Truth]] = []
+        self._plain: list[_Plain] = []
+        self._costs: list[_Addition] = []
         self._items: list[tuple[_Loop, _Leaf]] = []
         for item in block.items:
             self._add(item, frame)
@@ -136,13 +150,25 @@ class LoweredEffect:
         loop = _Loop(self._owner.lowering, frame, item.parameters, item.guard)
         leaf = item.leaf
         if isinstance(leaf, me.Add):
-            self._items.append((loop, _Addition(self._owner, leaf, frame)))
+            addition = _Addition(self._owner, leaf, frame)
+            if loop.trivial and leaf.to == "cost":
+                self._costs.append(addition)
+            else:
+                self._items.append((loop, addition))
             return
         number = self._owner.lowering.number(leaf.predicate, leaf.args, frame)
-        if loop.trivial:
-            self._plain.append((number, leaf.value))
-        else:
+        if not loop.trivial:
             self._items.append((loop, _Setting(number, leaf.value)))
+        elif self._owner.atoms.numbers[leaf.predicate]:
+            numbers = self._owner.lowering.numbers(leaf.predicate, leaf.args, frame)
+            self._plain.append(_Plain(leaf.predicate, number, numbers, leaf.value))
+            # Variables are numbered predicate by predicate: in this order most are sorted already.
+            self._plain.sort(key=lambda plain: f"{plain.predicate}(")
+
+    @property
+    def _is_plain(self) -> bool:
+        """Whether there is no chance, and nothing under a condition."""
+        return not self._items and not self._chances
 
     def factors(self, env: Env) -> tuple[tuple[Factor, ...], Fraction]:
         """Independent factors, and the cost that is certain.
@@ -150,36 +176,71 @@ class LoweredEffect:
         What is certain joins the outcomes of a single factor; beside several it is a factor of its
         own with probability 1.
         """
-        if not self._items and not self._chances:
-            sets = self._plain_sets(env)
-            if not sets:
-                return (), ZERO
-            # The common case of an action without chance or condition; its pairs are shared.
-            pairs = self._pairs
-            made = tuple([pairs[sets[number]][number] for number in sorted(sets)])
-            return (Factor((Outcome(ONE, (Effect(None, made),)),)),), ZERO
+        if self._is_plain:
+            numbers = [plain.number(env) for plain in self._plain]
+            return _certain([self._pairs_of(numbers)])[0], self._cost(env)
         part = self.part(env, [])
         cost, part.cost = part.cost, ZERO
         return _arranged(part), cost
 
-    def _plain_sets(self, env: Env) -> dict[int, Truth]:
+    def all(self, rows: list[Row]) -> list[tuple[tuple[Factor, ...], Fraction]]:
+        """:meth:`factors` of many argument rows."""
+        if not self._is_plain:
+            return [self.factors(self._frame.env(row)) for row in rows]
+        made = _certain(self._all_pairs(rows))
+        costs = [self._cost(self._frame.env(row)) for row in rows] if self._costs else repeat(ZERO, len(rows))
+        return list(zip(made, costs, strict=True))
+
+    def _cost(self, env: Env) -> Fraction:
+        amounts = [each.amount(env) for each in self._costs]
+        return amounts[0] if len(amounts) == 1 else sum(amounts, ZERO)
+
+    def _all_pairs(self, rows: list[Row]) -> list[tuple[tuple[int, Truth], ...]]:
+        """What the settings of each row come to."""
+        if not self._plain:
+            return [()] * len(rows)
+        columns = [plain.numbers(rows) for plain in self._plain]
+        if any(None in column for column in columns):
+            return list(map(self._pairs_of, zip(*columns, strict=True)))
+        # No variable is None from here on.
+        known = cast("list[list[int]]", columns)
+        pairs = zip(
+            *(
+                map(self._pairs[plain.value].__getitem__, numbers)
+                for plain, numbers in zip(self._plain, known, strict=True)
+            ),
+            strict=True,
+        )
+        if all(all(map(lt, one, other)) for one, other in pairwise(known)):
+            return list(pairs)
+        made = list(map(tuple, map(sorted, pairs)))
+        for index, numbers in enumerate(zip(*columns, strict=True)):
+            if len({*numbers}) < len(numbers):
+                made[index] = self._pairs_of(numbers)
+        return made
+
+    def _pairs_of(self, numbers: Sequence[int | None]) -> tuple[tuple[int, Truth], ...]:
+        """What the settings of these variables (None: one that never changes) come to."""
+        sets = self._merged(numbers)
+        return tuple([self._pairs[sets[number]][number] for number in sorted(sets)])
+
+    def _merged(self, numbers: Iterable[int | None]) -> dict[int, Truth]:
         sets: dict[int, Truth] = {}
-        for number_of, value in self._plain:
-            number = number_of(env)
+        for number, plain in zip(numbers, self._plain, strict=True):
             # Where one occurrence sets a variable twice, the Kleene maximum wins.
-            if number is not None and sets.get(number, -1) < value:
-                sets[number] = value
+            if number is not None and sets.get(number, -1) < plain.value:
+                sets[number] = plain.value
         return sets
 
     @property
-    def plain(self) -> list[Callable[[Env], int | None]] | None:
+    def plain(self) -> list[_Numbers] | None:
         """The variables set by an effect without chance, quantifiers and guards; None for others."""
-        return None if self._items or self._chances else [number for number, _ in self._plain]
+        return [plain.numbers for plain in self._plain] if self._is_plain else None
 
     def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
         """Every variable that may be set, with the conditions under which it is."""
-        for number_of, _ in self._plain:
-            number = number_of(env)
+        for plain in self._plain:
+            number = plain.number(env)
             if number is not None:
                 yield number, above
         for loop, leaf in self._items:
@@ -194,7 +255,9 @@ class LoweredEffect:
     def part(self, env: Env, above: list[Condition]) -> _Part:
         """What happens in an environment, under the conditions above."""
         part = _Part()
-        sets = self._plain_sets(env)
+        for addition in self._costs:
+            addition.run(part, env, conjoin(above))
+        sets = self._merged([plain.number(env) for plain in self._plain])
         if sets:
             part.sets[conjoin(above)] = sets
         for loop, leaf in self._items:
@@ -207,6 +270,19 @@ class LoweredEffect:
                 else:
                     _absorb(part, factor.outcomes[0])
         return part
+
+
+_Numbers = Callable[[list[Row]], "list[int | None]"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Plain:
+    """An unconditional setting: the variable in an environment and in many rows, and its value."""
+
+    predicate: str
+    number: Callable[[Env], int | None]
+    numbers: _Numbers
+    value: Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +302,12 @@ class _Addition:
     def __init__(self, owner: EffectLowering, leaf: me.Add, frame: Frame) -> None:
         self._report = owner.report
         self._leaf = leaf
-        self._amount = _Amounts(owner, frame).lower(leaf.amount)
+        self._value = _Amounts(owner, frame).lower(leaf.amount)
+
+    def amount(self, env: Env) -> Fraction:
+        """What is added, with its sign."""
+        value = self._value(env)
+        return value if self._leaf.sign == 1 else self._leaf.sign * value
 
     def run(self, part: _Part, env: Env, guard: Condition) -> None:
         """Count it where it is certain. A task has no place for one that depends on the state."""
@@ -238,9 +319,9 @@ class _Addition:
             else:
                 self._report.warning("BBT0409", "a reward under a condition is not counted", leaf.span)
         elif leaf.to == "cost":
-            part.cost += leaf.sign * self._amount(env)
+            part.cost += self.amount(env)
         else:
-            part.reward += leaf.sign * self._amount(env)
+            part.reward += self.amount(env)
 
 
 _Leaf = _Setting | _Addition
@@ -335,6 +416,15 @@ class _Amounts:
 
 
 # --- putting together ----------------------------------------------------------------------------
+
+
+def _certain(sets: list[tuple[tuple[int, Truth], ...]]) -> list[tuple[Factor, ...]]:
+    """For each the factor that certainly sets these variables; none where nothing is set."""
+    size, zeros = len(sets), repeat(ZERO)
+    effects = instances(Effect, size, repeat(None), sets)
+    outcomes = instances(Outcome, size, repeat(ONE), zip(effects), repeat(()), zeros, zeros)
+    factors: list[tuple[Factor, ...]] = list(zip(instances(Factor, size, zip(outcomes), repeat(False))))
+    return factors if all(sets) else [made if each else () for made, each in zip(factors, sets, strict=True)]
 
 
 def _put(sets: dict[int, Truth], number: int, value: Truth) -> None:

@@ -6,12 +6,15 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from itertools import repeat
+from operator import is_, itemgetter
 
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.atoms import Atoms
+from bbtc.ground.bulk import CHUNK, instances
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
 from bbtc.ground.effects import EffectLowering, LoweredEffect
 from bbtc.ground.goal import unreachable
@@ -66,6 +69,10 @@ def _collector_paused() -> Iterator[None]:
         yield
     finally:
         if enabled:
+            if not gc.get_freeze_count():
+                # Counts everything as old at once, which otherwise happens by looking at it thrice.
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 
@@ -186,26 +193,32 @@ class _TaskBuilder:
         return tuple(sorted(ordered, key=lambda action: action.name))
 
     def _instances(self, schema: md.Schema, rows: list[Row]) -> list[gt.GroundAction]:
-        frame = Frame(self.universe, schema.parameters)
-        precondition = self.lowering.condition(schema.precondition, frame, strict=True)
-        effect = self.effects.effect(self.reached.usage.blocks[schema.name], frame)
+        """The actions of a schema with the given rows, which are used up. They are made some
+        thousands at a time, and the rows given up as it goes: a million of them take 100 MB."""
+        conditions = self.lowering.reached(schema.precondition, schema.parameters)
+        effects = self.effects.reached(self.reached.usage.blocks[schema.name], schema.parameters)
         unit, counts_cost = Fraction(1), self.model.counts_cost
-        args, name, span = self.universe.args, schema.name, schema.span
-        made = []
-        # Each row is given up as its action is made: a million of them take 100 MB.
+        made: list[gt.GroundAction] = []
         rows.reverse()
         while rows:
-            row = rows.pop()
-            if not len(rows) & 0xFFF:
-                self.limits.check_time("grounding")
-            env = frame.env(row)
-            condition = precondition(env)
-            if condition is FALSE:
-                continue
-            factors, cost = effect.factors(env)
-            if not counts_cost:
-                cost = unit
-            made.append(gt.GroundAction(name, args(row), condition, factors or _NO_FACTORS, cost, span))
+            self.limits.check_time("grounding")
+            chunk = rows[: -CHUNK - 1 : -1]
+            del rows[-CHUNK:]
+            found = conditions.all(chunk)
+            if any(map(is_, found, repeat(FALSE))):
+                chunk = [row for row, condition in zip(chunk, found, strict=True) if condition is not FALSE]
+                found = [condition for condition in found if condition is not FALSE]
+            done = effects.all(chunk)
+            made += instances(
+                gt.GroundAction,
+                len(chunk),
+                repeat(schema.name),
+                self.universe.all_args(chunk),
+                found,
+                [factors or _NO_FACTORS for factors, _ in done],
+                map(itemgetter(1), done) if counts_cost else repeat(unit),
+                repeat(schema.span),
+            )
         return made
 
     def _called(self) -> set[str]:

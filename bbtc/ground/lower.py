@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from operator import itemgetter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import combinations, repeat
+from operator import is_, itemgetter
 from typing import Any
 
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import BbtcError
-from bbtc.ground.atoms import Atoms
+from bbtc.ground.atoms import Atoms, Leaves
+from bbtc.ground.bulk import Shared, instances, picker
 from bbtc.ground.condition import (
     FALSE,
     TRUE,
     And,
     Condition,
+    Constant,
     Is,
     Or,
     conjunction,
     disjunction,
     negation,
 )
-from bbtc.ground.normal import conjuncts, disjuncts, normal_form
+from bbtc.ground.normal import conjuncts, disjuncts, free, normal_form
 from bbtc.ground.universe import Row, Universe
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -68,6 +71,30 @@ class Frame:
         getter: Any = itemgetter(*slots)
         return getter  # type: ignore[no-any-return]
 
+    def columns(self, args: tuple[mf.Term, ...]) -> Callable[[list[Row]], Iterable[Row]]:
+        """Reads the arguments of an atom (parameters or objects) from many argument rows."""
+        if all(map(mf.is_parameter, args)):
+            return picker([self.slot(arg) for arg in args])
+        getters = [
+            itemgetter(self.slot(arg)) if mf.is_parameter(arg) else self.universe.index[arg] for arg in args
+        ]
+
+        def read(rows: list[Row]) -> Iterable[Row]:
+            size = len(rows)
+            columns = (repeat(get, size) if isinstance(get, int) else map(get, rows) for get in getters)
+            return zip(*columns, strict=True)
+
+        return read
+
+
+def projection(
+    universe: Universe, parameters: tuple[Parameter, ...], read: Iterable[str]
+) -> tuple[list[int], Frame]:
+    """The places of the parameters that are read, and a frame of these alone."""
+    names = set(read)
+    used = [slot for slot, parameter in enumerate(parameters) if parameter.name in names]
+    return used, Frame(universe, [parameters[slot] for slot in used])
+
 
 class Lowering:
     """Compiles the conditions of one model."""
@@ -82,6 +109,15 @@ class Lowering:
     def condition(self, formula: mf.Formula, frame: Frame, *, strict: bool = False) -> Lowered:
         """``strict``: only whether the condition is true matters, not whether false or unknown."""
         return self.normal(normal_form(formula), frame, strict=strict)
+
+    def reached(self, formula: mf.Formula, parameters: tuple[Parameter, ...]) -> Shared[Condition]:
+        """:meth:`condition` (strict) for many argument rows, of which reachability has found that the
+        formula can be true of them: there, parts that never change are true."""
+        parts = sorted(conjuncts(normal_form(formula)), key=self._late)
+        parts = [part for part in parts if not self._settled(part)]
+        names = (name for part in parts for name in free(part))
+        used, frame = projection(self.universe, parameters, names)
+        return Shared(used, len(parameters), _Conjunction(self, parts, frame).all)
 
     def spend(self, count: int) -> None:
         """Count objects that a quantifier is tried with. Raises at the limit."""
@@ -129,6 +165,13 @@ class Lowering:
         rows, get = frame.rows(args), self.atoms.numbers[predicate].get
         return lambda env: get(rows(env))
 
+    def numbers(
+        self, predicate: str, args: tuple[mf.Term, ...], frame: Frame
+    ) -> Callable[[list[Row]], list[int | None]]:
+        """:meth:`number` of many argument rows."""
+        get, read = self.atoms.numbers[predicate].get, frame.columns(args)
+        return lambda rows: list(map(get, read(rows)))
+
     def _late(self, part: mf.Formula) -> int:
         """Constant parts first: they often settle the whole without a look at the rest. Parts that
         are not constant keep their order."""
@@ -139,6 +182,20 @@ class Lowering:
                 return 1 if self.atoms.reach.usage.is_static(predicate) else 2
             case _:
                 return 2
+
+    def _settled(self, part: mf.Formula) -> bool:
+        """Whether the part is the same at all times."""
+        match part:
+            case mf.Equal() | mf.Not(mf.Equal()):
+                return True
+            case mf.Atom(predicate) | mf.Not(mf.Atom(predicate)):
+                if predicate in self.atoms.reach.usage.derived:
+                    return predicate in self.atoms.reach.usage.unchanging
+                value = Truth.TRUE if isinstance(part, mf.Atom) else Truth.FALSE
+                leaves, _ = self.atoms.leaves(predicate, value, strict=True)
+                return all(isinstance(leaf, Constant) for leaf in leaves.values())
+            case _:
+                return False
 
     def _literal(
         self, predicate: str, args: tuple[mf.Term, ...], value: Truth | None, frame: Frame, strict: bool
@@ -159,67 +216,98 @@ def _equal(left: int, right: int, same: Condition, different: Condition) -> Lowe
 
 
 def _all(parts: list[Lowered]) -> Lowered:
-    if len(parts) == 1:
-        return parts[0]
-
-    def run(env: Env) -> Condition:
-        found = []
-        for part in parts:
-            condition = part(env)
-            if condition is FALSE:
-                return FALSE
-            if condition is not TRUE:
-                found.append(condition)
-        return conjoin(found)
-
-    return run
+    return parts[0] if len(parts) == 1 else lambda env: _every(part(env) for part in parts)
 
 
 def _any(parts: list[Lowered]) -> Lowered:
-    if len(parts) == 1:
-        return parts[0]
-
-    def run(env: Env) -> Condition:
-        found = []
-        for part in parts:
-            condition = part(env)
-            if condition is TRUE:
-                return TRUE
-            if condition is not FALSE:
-                found.append(condition)
-        return disjunction(found)
-
-    return run
+    return parts[0] if len(parts) == 1 else lambda env: _some(part(env) for part in parts)
 
 
 def _for_all(slot: int, members: tuple[int, ...], inner: Lowered, spend: Callable[[int], None]) -> Lowered:
-    def run(env: Env) -> Condition:
-        spend(len(members))
-        found = []
-        for env[slot] in members:
-            condition = inner(env)
-            if condition is FALSE:
-                return FALSE
-            if condition is not TRUE:
-                found.append(condition)
-        return conjoin(found)
-
-    return run
+    return lambda env: _every(map(inner, extend(env, [(slot, members)], spend)))
 
 
 def _for_some(slot: int, members: tuple[int, ...], inner: Lowered, spend: Callable[[int], None]) -> Lowered:
-    def run(env: Env) -> Condition:
-        spend(len(members))
-        found = []
-        for env[slot] in members:
-            condition = inner(env)
-            if condition is TRUE:
-                return TRUE
-            if condition is not FALSE:
-                found.append(condition)
-        return disjunction(found)
+    return lambda env: _some(map(inner, extend(env, [(slot, members)], spend)))
 
-    return run
+
+def _every(parts: Iterable[Condition]) -> Condition:
+    """The conjunction; nothing is looked at after a part that is false."""
+    found = _until(FALSE, parts)
+    return FALSE if found is None else conjoin(found)
+
+
+def _some(parts: Iterable[Condition]) -> Condition:
+    """The disjunction; nothing is looked at after a part that is true."""
+    found = _until(TRUE, parts)
+    return TRUE if found is None else disjunction(found)
+
+
+def _until(end: Condition, parts: Iterable[Condition]) -> list[Condition] | None:
+    """The parts that are no constants; None if one of them is ``end``."""
+    found = []
+    for part in parts:
+        if part is end:
+            return None
+        if part is not TRUE and part is not FALSE:
+            found.append(part)
+    return found
+
+
+class _Conjunction:
+    """The conjunction of some parts in normal form, for many argument rows at once."""
+
+    def __init__(self, lowering: Lowering, parts: Sequence[mf.Formula], frame: Frame) -> None:
+        self._columns = []
+        # Of what value each column is, if it is of nothing but literals of one predicate.
+        self._kinds: list[tuple[str, Truth] | None] = []
+        for part in parts:
+            match part:
+                case mf.Atom(predicate, args) | mf.Not(mf.Atom(predicate, args)) if (
+                    predicate not in lowering.atoms.reach.usage.derived
+                ):
+                    value = Truth.TRUE if isinstance(part, mf.Atom) else Truth.FALSE
+                    leaves, other = lowering.atoms.leaves(predicate, value, strict=True)
+                    self._columns.append(_leaf_column(leaves, other, frame.columns(args)))
+                    plain = all(type(leaf) is Is for leaf in leaves.values())
+                    self._kinds.append((predicate, value) if plain else None)
+                case _:
+                    self._columns.append(_column(lowering.normal(part, frame, strict=True), frame))
+                    self._kinds.append(None)
+        self._alike = [
+            (one, other)
+            for one, other in combinations(range(len(parts)), 2)
+            if self._kinds[one] == self._kinds[other]
+        ]
+
+    def all(self, rows: list[Row]) -> list[Condition]:
+        """The condition of each row."""
+        columns = [column(rows) for column in self._columns]
+        if not columns:
+            return [TRUE] * len(rows)
+        if not self._distinct_leaves(columns):
+            return list(map(_every, zip(*columns, strict=True)))
+        if len(columns) == 1:
+            return columns[0]
+        return [*instances(And, len(rows), zip(*columns, strict=True))]
+
+    def _distinct_leaves(self, columns: list[list[Condition]]) -> bool:
+        """Whether there is nothing to leave out in any row: no constant, nothing twice."""
+        for kind, column in zip(self._kinds, columns, strict=True):
+            if kind is None or (kind[1] is Truth.FALSE and any(map(is_, column, repeat(TRUE)))):
+                return False
+        return not any(any(map(is_, columns[one], columns[other])) for one, other in self._alike)
+
+
+def _leaf_column(
+    leaves: Leaves, other: Condition, read: Callable[[list[Row]], Iterable[Row]]
+) -> Callable[[list[Row]], list[Condition]]:
+    get = leaves.get
+    return lambda rows: list(map(get, read(rows), repeat(other)))
+
+
+def _column(lowered: Lowered, frame: Frame) -> Callable[[list[Row]], list[Condition]]:
+    return lambda rows: [lowered(frame.env(row)) for row in rows]
 
 
 def conjoin(parts: list[Condition]) -> Condition:

@@ -81,6 +81,38 @@ def _walk(
             assert_never(effect)
 
 
+def reads(block: Block) -> Iterator[str]:
+    """The terms of a block, repeats and those that it binds itself included."""
+    for item in block.items:
+        for part in item.guard:
+            yield from free(part)
+        match item.leaf:
+            case me.Set(_, args):
+                yield from args
+            case me.Add(amount=amount):
+                yield from _terms(amount)
+            case _:
+                assert_never(item.leaf)
+    for chance in block.chances:
+        for part in chance.guard:
+            yield from free(part)
+        for _, branch in chance.branches:
+            yield from reads(branch)
+
+
+def _terms(amount: me.Amount) -> Iterator[str]:
+    match amount:
+        case me.Constant():
+            return
+        case me.FunctionValue(_, args):
+            yield from args
+        case me.Arithmetic(_, operands):
+            for operand in operands:
+                yield from _terms(operand)
+        case _:
+            assert_never(amount)
+
+
 # --- conditions ------------------------------------------------------------------------------
 
 

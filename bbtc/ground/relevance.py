@@ -6,15 +6,17 @@ templates: a task with a million actions is then made once, with what matters on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from itertools import compress
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain, compress
+from operator import not_
 
 from bbtc.diagnostics import Report
 from bbtc.ground.atoms import Atoms
+from bbtc.ground.bulk import chunks, picker
 from bbtc.ground.condition import Condition, variables
 from bbtc.ground.effects import EffectLowering
-from bbtc.ground.lower import Env, Frame, Lowering
-from bbtc.ground.normal import conjuncts, normal_form
+from bbtc.ground.lower import Frame, Lowering, projection
+from bbtc.ground.normal import conjuncts, normal_form, reads
 from bbtc.ground.universe import Row
 from bbtc.limits import Limits
 from bbtc.model import domain as md
@@ -22,35 +24,66 @@ from bbtc.model import effect as me
 from bbtc.model import formula as mf
 
 _SWEEPS = 6
+Numbers = Callable[[list[Row]], Iterable[int | None]]
 
 
 class _Rows:
-    """The rows of one schema, and which of them matter."""
+    """The rows of one schema; ``left`` are those that may still turn out to matter."""
 
     def __init__(self, lowering: Lowering, schema: md.Schema, rows: list[Row]) -> None:
-        self.rows = rows
-        self.kept = bytearray(len(rows))
-        self.frame = Frame(lowering.universe, schema.parameters)
+        self.rows = self.left = rows
         block = lowering.atoms.reach.usage.blocks[schema.name]
+        used, frame = projection(lowering.universe, schema.parameters, reads(block))
+        self.key = picker(used)
         # What is reported here is reported again when the actions are made.
-        self.effect = EffectLowering(lowering, Report()).effect(block, self.frame)
+        self._effect = EffectLowering(lowering, Report()).effect(block, frame)
+        self._env = frame.env
+        self._keys: dict[Row, None] = {}
         self.guarded = next(me.conditions(schema.effect), None) is not None
-        self._precondition = lowering.condition(schema.precondition, self.frame, strict=True)
-        self._literals = _literals(lowering, schema.precondition, self.frame)
+        self._conditions = lowering.reached(schema.precondition, schema.parameters)
+        self._literals = _literals(lowering, schema.precondition, Frame(lowering.universe, schema.parameters))
 
-    def reads(self, env: Env) -> Iterable[int | None]:
-        """The variables that the precondition reads (and perhaps None)."""
+    def test(self, read: set[int]) -> Callable[[list[Row]], list[bool]]:
+        """The function that says of each row whether it sets a variable that matters. The guards of
+        such settings matter, too, and are added."""
+        plain = self._effect.plain
+        if plain is None:
+            self._keys = self._keys or dict.fromkeys(self.key(self.rows))
+            known = {key: self.sets(key, read) for key in self._keys}
+            return lambda rows: list(map(known.__getitem__, self.key(rows)))
+
+        def test(rows: list[Row]) -> list[bool]:
+            keys = list(self.key(rows))
+            found = [map(read.__contains__, numbers(keys)) for numbers in plain]
+            return list(map(any, zip(*found, strict=True))) if found else [False] * len(rows)
+
+        return test
+
+    def sets(self, key: Row, read: set[int]) -> bool:
+        """:meth:`test` of what the effect reads of a row."""
+        matters = False
+        for number, guard in self._effect.settings(self._env(key), []):
+            if number in read:
+                matters = True
+                read.update(number for part in guard for number in variables(part))
+        return matters
+
+    def numbers(self, key: Row) -> dict[int, None]:
+        """The variables that an action may set, by what its effect reads of its row."""
+        return {number: None for number, _ in self._effect.settings(self._env(key), [])}
+
+    def reads(self, rows: list[Row]) -> Iterator[int | None]:
+        """The variables that preconditions read (and perhaps None)."""
         if self._literals is not None:
-            return [number(env) for number in self._literals]
-        return variables(self._precondition(env))
+            return chain.from_iterable(numbers(rows) for numbers in self._literals)
+        distinct = {id(condition): condition for condition in self._conditions.all(rows)}
+        return chain.from_iterable(map(variables, distinct.values()))
 
 
-def _literals(
-    lowering: Lowering, formula: mf.Formula, frame: Frame
-) -> list[Callable[[Env], int | None]] | None:
+def _literals(lowering: Lowering, formula: mf.Formula, frame: Frame) -> list[Numbers] | None:
     """The variables that a conjunction of literals reads; None for other conditions, of which
     constants may leave a part only."""
-    found = []
+    found: list[Numbers] = []
     for part in conjuncts(normal_form(formula)):
         match part:
             case mf.Equal() | mf.Not(mf.Equal()):
@@ -58,7 +91,8 @@ def _literals(
             case mf.Atom(predicate, args) | mf.Not(mf.Atom(predicate, args)):
                 if predicate in lowering.atoms.reach.usage.derived:
                     return None
-                found.append(lowering.number(predicate, args, frame))
+                if lowering.atoms.numbers[predicate]:
+                    found.append(lowering.numbers(predicate, args, frame))
             case _:
                 return None
     return found
@@ -69,31 +103,39 @@ class Relevance:
 
     def __init__(self, atoms: Atoms, goal: Condition, rows: list[list[Row]], limits: Limits) -> None:
         self._atoms = atoms
+        self._limits = limits
         model = atoms.model
         lowering = Lowering(atoms, limits)
         self._schemas = [
             _Rows(lowering, schema, each) for schema, each in zip(model.schemas.values(), rows, strict=True)
         ]
-        self.read: set[int | None] = {None, *variables(goal)}
+        self.read = set(variables(goal))
         if model.metric == "reward":
             for schema, each in zip(model.schemas.values(), self._schemas, strict=True):
                 if any(isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect)):
-                    for index in range(len(each.rows)):
-                        self._keep(each, index)
+                    self._keep(each, each.rows)
+                    each.left = []
         self._close()
 
     def rows(self) -> list[list[Row]]:
         """The rows that matter, in their order. The others are given up."""
         handed = []
         for each in self._schemas:
-            handed.append(each.rows if all(each.kept) else list(compress(each.rows, each.kept)))
-            if handed[-1] is not each.rows:
+            if each.left:
+                test = each.test(self.read)
+                kept = [row for rows in chunks(each.rows) for row in compress(rows, test(rows))]
                 each.rows.clear()
+                handed.append(kept)
+            else:
+                handed.append(each.rows)
         return handed
 
     def keep(self) -> set[tuple[str, Row]]:
         """The variables that matter."""
-        return {self._atoms.keys[number] for number in self.read if number is not None}
+        return {self._atoms.keys[number] for number in self.read}
+
+    def _keep(self, each: _Rows, rows: list[Row]) -> None:
+        self.read.update(number for number in each.reads(rows) if number is not None)
 
     def _close(self) -> None:
         """Sweep over the rows until nothing changes; where that takes long, follow an index instead."""
@@ -106,48 +148,30 @@ class Relevance:
         self._follow()
 
     def _sweep(self, each: _Rows) -> None:
-        plain = each.effect.plain
-        if plain is None:
-            for index in range(len(each.rows)):
-                if each.guarded or not each.kept[index]:
-                    self._look(each, index)
-            return
-        # The same as _look for the many actions of plain tasks, with nothing in the way.
-        read, kept, env_of = self.read, each.kept, each.frame.env
-        for index, row in enumerate(each.rows):
-            if not kept[index]:
-                env = env_of(row)
-                for number_of in plain:
-                    number = number_of(env)
-                    if number is not None and number in read:
-                        kept[index] = 1
-                        read.update(each.reads(env))
-                        break
-
-    def _look(self, each: _Rows, index: int) -> None:
-        """Keep a row if it sets a variable that matters; then what it reads matters, too."""
-        for number, guard in each.effect.settings(each.frame.env(each.rows[index]), []):
-            if number in self.read:
-                self._keep(each, index)
-                self.read.update(number for part in guard for number in variables(part))
-
-    def _keep(self, each: _Rows, index: int) -> None:
-        if not each.kept[index]:
-            each.kept[index] = 1
-            self.read.update(each.reads(each.frame.env(each.rows[index])))
+        """Keep the rows that set a variable that matters; then what they read matters, too."""
+        left: list[Row] = []
+        test = each.test(self.read)
+        for rows in chunks(each.left):
+            self._limits.check_time("grounding")
+            matters = test(rows)
+            self._keep(each, list(compress(rows, matters)))
+            left += compress(rows, map(not_, matters))
+        each.left = left
 
     def _follow(self) -> None:
         """Look again at the rows that set a variable, whenever one turns out to matter."""
-        setters: dict[int | None, list[tuple[_Rows, int]]] = {}
+        setters: dict[int, list[tuple[dict[Row, list[Row]], _Rows, Row]]] = {}
         for each in self._schemas:
-            for index in range(len(each.rows)):
-                if each.guarded or not each.kept[index]:
-                    env = each.frame.env(each.rows[index])
-                    for number in {number for number, _ in each.effect.settings(env, [])}:
-                        setters.setdefault(number, []).append((each, index))
-        done: set[int | None] = {None}
+            groups: dict[Row, list[Row]] = {}
+            for key, row in zip(each.key(each.left), each.left, strict=True):
+                groups.setdefault(key, []).append(row)
+            for key in dict.fromkeys(each.key(each.rows)) if each.guarded else groups:
+                for number in each.numbers(key):
+                    setters.setdefault(number, []).append((groups, each, key))
+        done: set[int] = set()
         while self.read != done:
             for fresh in self.read - done:
                 done.add(fresh)
-                for each, index in setters.get(fresh, ()):
-                    self._look(each, index)
+                for groups, each, key in setters.get(fresh, ()):
+                    each.sets(key, self.read)
+                    self._keep(each, groups.pop(key, []))

@@ -34,6 +34,13 @@ class Universe:
         names = self.names
         return tuple([names[number] for number in row])
 
+    def all_args(self, rows: list[Row]) -> list[tuple[str, ...]]:
+        """:meth:`args` of many rows of one length."""
+        if not rows or not rows[0]:
+            return [()] * len(rows)
+        name = self.names.__getitem__
+        return list(zip(*(map(name, column) for column in zip(*rows, strict=True)), strict=True))
+
     def row(self, args: tuple[str, ...]) -> Row:
         """The numbers of named objects."""
         return tuple([self.index[name] for name in args])
