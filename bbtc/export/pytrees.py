@@ -1,7 +1,7 @@
-"""Exporter ``py_trees``: a Python module for py_trees 2.2 and later that stands on its own.
+"""Exporter ``py_trees``: a Python module for py_trees 2.2 and later.
 
-It holds the interface that a robot implements, the behaviours that py_trees lacks (copied from
-:mod:`bbtc.export.runtime`), the tree, and a simulated world to run it in.
+It holds the interface that a robot implements, the behaviours that py_trees lacks (copied or imported
+from :mod:`bbtc.runtime`), the tree, and a simulated world to run it in.
 """
 
 from __future__ import annotations
@@ -11,10 +11,18 @@ from dataclasses import dataclass
 
 from typing_extensions import assert_never
 
-from bbtc.export.interface import Interface, Leaf, action_symbol, guard_of, interface_of, variable_symbol
+from bbtc.export.interface import Interface, action_symbol, guard_of, interface_of, variable_symbol
 from bbtc.export.names import PYTHON_RESERVED, Symbol, identifiers, printable
 from bbtc.export.pycode import Code, Group, Prefixed, call, layout, literal
-from bbtc.export.pytrees_parts import ConditionCode, method_parameters, runtime_source
+from bbtc.export.pytrees_parts import (
+    ConditionCode,
+    action_summary,
+    condition_summary,
+    condition_type,
+    harmless,
+    method,
+)
+from bbtc.export.pytrees_runtime import RUNTIME, copied, defined, imports, needed, used_in
 from bbtc.export.pytrees_world import WorldWriter
 from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.export.shape import fit, normal, words_of
@@ -28,7 +36,6 @@ from bbtc.tree.nodes import (
     Tree,
     actions_of,
     retries_of,
-    walk,
 )
 
 _DEEPEST_EXPRESSION = 10  # levels of nodes in one function; a deeper subtree gets a function
@@ -55,12 +62,12 @@ class PyTreesExporter:
     name: str = "py_trees"
     description: str = "Python module for py_trees 2.2 or later, with a simulated world to run it in"
     suffix: str = ".py"
-    options: tuple[Option, ...] = ()
+    options: tuple[Option, ...] = (RUNTIME,)
 
     def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
         """The source text. Raises :class:`BbtcError` (BBT0705) for a tree that is too deep."""
-        del options, figures  # a file that runs has no place for figures
-        return _Writer(tree).module()
+        del figures  # a file that runs has no place for them
+        return _Writer(tree, embedded=options[RUNTIME.name] == "embedded").module()
 
 
 py_trees = PyTreesExporter()
@@ -69,7 +76,8 @@ py_trees = PyTreesExporter()
 class _Writer:
     """Writes one module. The tree comes first: it tells which helpers and imports are needed."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, *, embedded: bool) -> None:
+        self.embedded = embedded
         self.task: Task = tree.task
         self.claim = tree.success_probability
         self.root = fit(tree.root, "py_trees")
@@ -82,56 +90,43 @@ class _Writer:
 
     def module(self) -> str:
         """The source text."""
-        body = layout(call("StopWhenBlocked", self._code(self.root, 1)), "return ", level=1)
+        body = layout(call("StopWhenBlocked", "robot", self._code(self.root, 1)), "return ", level=1)
         root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *body]
-        tables, world = self.world.tables(), self.world.world()
-        composites: set[str] = {node.kind for node in walk(self.root) if isinstance(node, ControlNode)}
-        nodes = {"Condition", "Action", "Latch", "StopWhenBlocked", "run", *self.conditions.used, *composites}
-        if "skipper" in composites:
-            nodes.add("Skipper")
-        if "retry" in composites:
-            nodes |= {"Retry", "Try"}
-        simulation = ["When", "Outcome", "Factor", "draw", "happen", "World", "in_words", "simulate"]
-        blocks = [
-            self._protocol(),
-            *runtime_source("pytrees_nodes", nodes),
-            *self.branches,
-            root,
-            *runtime_source("simulated_world", ["Fact", "State", "T", *simulation]),
-            *tables,
-            world,
-            _MAIN.splitlines(),
-        ]
-        lines = [*self._docstring(), "", *_imports(composites)]
-        for block in blocks:
+        trees, tables, main = [*self.branches, root], self.world.tables(), _MAIN.splitlines()
+        # Without the methods of the robots, whose parameters may be named like anything.
+        used = {"Protocol", "Status", "World", "run"}
+        used |= used_in(line for block in [*trees, *tables, main] for line in block)
+        if self.embedded:
+            used = needed(used)
+            nodes, world, head = copied("nodes", used), copied("world", used), imports(used)
+        else:
+            nodes, world, head = [], [], imports(used, ("bbtc.runtime", defined(used)))
+            head += ["", _PUBLIC]
+        lines = [*self._docstring(), "", *head]
+        for block in [self._protocol(), *nodes, *trees, *world, *tables, self.world.world(), main]:
             lines += ["", "", *block]
         return "\n".join(lines) + "\n"
 
     def _docstring(self) -> list[str]:
-        problem, domain = _harmless(self.task.problem), _harmless(self.task.domain)
+        problem, domain = harmless(self.task.problem), harmless(self.task.domain)
         return [
             f'"""Behavior tree for the problem {problem} of the domain {domain}. Made by bbtc.',
             "",
             f"In the model of that domain it succeeds with probability {self.claim}.",
             *_USAGE.splitlines(),
+            _REQUIRED[self.embedded],
             '"""',
         ]
 
     # --- interface ---------------------------------------------------------------------------
 
     def _protocol(self) -> list[str]:
-        lines = _PROTOCOL.splitlines()
+        lines, methods = _PROTOCOL.splitlines(), self.names.methods
         for leaf in self.names.interface.conditions:
-            result = "bool | None" if leaf.three_valued else "bool"
-            unknown = "; None where that is unknown" if leaf.three_valued else ""
-            lines += self._method(leaf, result, f"Whether {_signature(leaf)} holds{unknown}.")
+            lines += method(methods[leaf.symbol], leaf, condition_type(leaf), condition_summary(leaf))
         for leaf in self.names.interface.actions:
-            lines += self._method(leaf, "Status", f"Start or continue {_signature(leaf)}.")
+            lines += method(methods[leaf.symbol], leaf, "Status", action_summary(leaf))
         return lines
-
-    def _method(self, leaf: Leaf, result: str, summary: str) -> list[str]:
-        head = call(f"def {self.names.methods[leaf.symbol]}", *method_parameters(leaf))
-        return ["", *layout(head, suffix=f" -> {result}:", level=1), f'        """{summary}"""']
 
     # --- tree --------------------------------------------------------------------------------
 
@@ -155,7 +150,7 @@ class _Writer:
     def _branch(self, node: ControlNode) -> Code:
         body = layout(self._code(node, 1), "return ", level=1)
         name = f"branch_{len(self.branches) + 1}"
-        title = [f'    """For {_harmless(node.reason)}."""'] if node.reason else []
+        title = [f'    """For {harmless(node.reason)}."""'] if node.reason else []
         self.branches.append([f"def {name}(robot: Robot) -> Behaviour:", *title, *body])
         return call(name, "robot")
 
@@ -191,24 +186,6 @@ def _label(node: ControlNode) -> str:
     return printable(node.name or node.template or reason)
 
 
-def _imports(composites: set[str]) -> list[str]:
-    classes = {"skipper": "Composite", "fallback": "Selector", "sequence": "Sequence"}
-    used = ", ".join(sorted(classes[kind] for kind in composites if kind in classes))
-    lines = _IMPORTS.splitlines()
-    if used:
-        lines.insert(lines.index(_AFTER_COMPOSITES), f"from py_trees.composites import {used}")
-    return lines
-
-
-def _signature(leaf: Leaf) -> str:
-    return f"{_harmless(leaf.symbol.name)}({', '.join(leaf.parameters)})"
-
-
-def _harmless(text: str) -> str:
-    # For docstrings: what could end one, or begin an escape in it, becomes a question mark.
-    return "".join(c if c.isascii() and c.isprintable() and c not in '"\\' else "?" for c in text[:100])
-
-
 _CREATE_ROOT = '''\
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""'''
 
@@ -218,27 +195,14 @@ Implement the class Robot, and run
     run(create_root(MyRobot()), period=0.1)
 
 As a program, this module runs the tree in a simulated world (--help tells how).
-It needs py_trees 2.2 or later.
 """
 
-_AFTER_COMPOSITES = "from py_trees.decorators import Decorator"
+_REQUIRED = {
+    True: "It needs py_trees 2.2 or later.",
+    False: "It needs py_trees 2.2 or later, and bbtc.",
+}
 
-_IMPORTS = f"""\
-from __future__ import annotations
-
-import argparse
-import math
-import random
-import time
-from collections.abc import Callable, Iterator
-from fractions import Fraction
-from typing import Protocol, TypeVar
-
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
-{_AFTER_COMPOSITES}
-from py_trees.trees import BehaviourTree
-"""
+_PUBLIC = '__all__ = ["Robot", "SimulatedWorld", "create_root", "run"]'
 
 _PROTOCOL = '''\
 class Robot(Protocol):

@@ -1,15 +1,13 @@
-"""What the parts of a generated py_trees module share: conditions as code, and copied runtime."""
+"""What generated py_trees modules share: conditions, methods and texts as code."""
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Callable, Iterable
-from importlib import resources
+from collections.abc import Callable
 
 from typing_extensions import assert_never
 
 from bbtc.export.interface import Leaf
-from bbtc.export.pycode import Code, call, flat
+from bbtc.export.pycode import Code, call, flat, layout, literal
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.kleene import Truth
 
@@ -48,36 +46,39 @@ class ConditionCode:
         return call(function, *items)
 
 
-def method_parameters(leaf: Leaf) -> list[str]:
-    """The parameters of the method for a leaf, with types."""
-    return ["self", *(f"{name}: str" for name in leaf.parameters)]
+def method(name: str, leaf: Leaf, result: str, *body: str) -> list[str]:
+    """A method of a robot for a leaf, after an empty line; ``body`` is its lines, not indented."""
+    parameters = ["self", *(f"{parameter}: str" for parameter in leaf.parameters)]
+    head = layout(call(f"def {name}", *parameters), suffix=f" -> {result}:", level=1)
+    return ["", *head, *(f"        {line}" for line in body)]
 
 
-def runtime_source(module: str, names: Iterable[str]) -> list[list[str]]:
-    """The definitions with these names, as they stand in a module of :mod:`bbtc.export.runtime`:
-    blocks of lines, one for each class, function, and run of assignments."""
-    wanted = set(names)
-    text = (resources.files("bbtc.export") / "runtime" / f"{module}.py").read_text(encoding="utf-8")
-    lines = text.splitlines()
-    blocks: list[list[str]] = []
-    after_assignment = False
-    for statement in ast.parse(text).body:
-        if _defined(statement) in wanted:
-            source = lines[statement.lineno - 1 : statement.end_lineno]
-            assignment = isinstance(statement, ast.Assign)
-            if assignment and after_assignment:
-                blocks[-1] += source
-            else:
-                blocks.append(source)
-            after_assignment = assignment
-    return blocks
+def condition_type(leaf: Leaf) -> str:
+    """What the method of a condition returns."""
+    return "bool | None" if leaf.three_valued else "bool"
 
 
-def _defined(statement: ast.stmt) -> str | None:
-    match statement:
-        case ast.ClassDef(name=name) | ast.FunctionDef(name=name):
-            return name
-        case ast.Assign(targets=[ast.Name(id=name)]):
-            return name
-        case _:
-            return None
+def condition_summary(leaf: Leaf) -> str:
+    """The docstring of the method of a condition."""
+    unknown = "; None where that is unknown" if leaf.three_valued else ""
+    return f'"""Whether {_signature(leaf)} holds{unknown}."""'
+
+
+def action_summary(leaf: Leaf) -> str:
+    """The docstring of the method of an action."""
+    return f'"""Start or continue {_signature(leaf)}."""'
+
+
+def fact_of(leaf: Leaf) -> list[str]:
+    """The name of a leaf and its parameters, as arguments of a call."""
+    return [literal(leaf.symbol.name), *leaf.parameters]
+
+
+def _signature(leaf: Leaf) -> str:
+    return f"{harmless(leaf.symbol.name)}({', '.join(leaf.parameters)})"
+
+
+def harmless(text: str) -> str:
+    """The text for a docstring: what could end one, or begin an escape in it, becomes a question
+    mark, and it is cut."""
+    return "".join(c if c.isascii() and c.isprintable() and c not in '"\\' else "?" for c in text[:100])

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
-from bbtc.export.interface import Interface, Leaf, guard_of
+from bbtc.export.interface import Interface, guard_of
 from bbtc.export.names import Symbol
 from bbtc.export.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
-from bbtc.export.pytrees_parts import ConditionCode, method_parameters
+from bbtc.export.pytrees_parts import ConditionCode, condition_type, fact_of, method
 from bbtc.export.shape import normal
 from bbtc.ground.condition import FALSE, TRUE, variables
 from bbtc.ground.task import Factor, GroundAction, Outcome, Task
@@ -51,18 +51,13 @@ class WorldWriter:
         """The class ``SimulatedWorld``."""
         lines = ["class SimulatedWorld(World):", '    """Plays the robot."""']
         for leaf in self._interface.conditions:
-            value = flat(call("self._value", *_arguments(leaf)))
-            if leaf.three_valued:
-                lines += self._method(leaf, "bool | None", value)
-            else:
-                lines += self._method(leaf, "bool", f"{value} is True")
+            value = flat(call("self._value", *fact_of(leaf)))
+            answer = value if leaf.three_valued else f"{value} is True"
+            lines += method(self._methods[leaf.symbol], leaf, condition_type(leaf), f"return {answer}")
         for leaf in self._interface.actions:
-            lines += self._method(leaf, "Status", flat(call("self._act", *_arguments(leaf))))
+            answer = flat(call("self._act", *fact_of(leaf)))
+            lines += method(self._methods[leaf.symbol], leaf, "Status", f"return {answer}")
         return lines
-
-    def _method(self, leaf: Leaf, result: str, answer: str) -> list[str]:
-        head = call(f"def {self._methods[leaf.symbol]}", *method_parameters(leaf))
-        return ["", *layout(head, suffix=f" -> {result}:", level=1), f"        return {answer}"]
 
     def _initial(self) -> Code:
         merged: dict[tuple[Truth, ...], Fraction] = {}
@@ -130,7 +125,3 @@ def _probability(value: Fraction) -> str:
 
 def _tuple(words: tuple[str, ...]) -> str:
     return f"({', '.join(map(literal, words))}{',' if len(words) == 1 else ''})"
-
-
-def _arguments(leaf: Leaf) -> list[str]:
-    return [literal(leaf.symbol.name), *leaf.parameters]

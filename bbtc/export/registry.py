@@ -84,6 +84,7 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
         "btcpp": "bbtc.export.btcpp:btcpp",
         "btcpp_palette": "bbtc.export.btcpp_palette:btcpp_palette",
         "py_trees": "bbtc.export.pytrees:py_trees",
+        "py_trees_robot": "bbtc.export.pytrees_robot:py_trees_robot",
     }
 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import os
 import random
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from bbtc.belief.state import compile_action, initial_belief
 from bbtc.diagnostics import BbtcError
 from bbtc.export.pycode import call, layout, literal
 from bbtc.export.pytrees import py_trees_names
-from bbtc.export.pytrees_parts import runtime_source
+from bbtc.export.pytrees_runtime import MODULES, used_in
 from bbtc.export.registry import load_exporter, parse_options
 from bbtc.export.shape import DEEPEST_TREE
 from bbtc.ground.task import Task
@@ -32,29 +33,33 @@ from tests.replay.reference import random_run
 from tests.replay.script import Run, Script
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
+REPOSITORY = Path(__file__).resolve().parents[2]
 TRUTH = {True: 2, None: 1, False: 0}
 
 
-def export(tree: Tree) -> str:
-    exporter = load_exporter("py_trees")
-    text = exporter.export(tree, parse_options(exporter, {}), None)
+def export(tree: Tree, form: str = "py_trees", **options: str) -> str:
+    exporter = load_exporter(form)
+    text = exporter.export(tree, parse_options(exporter, options), None)
     assert isinstance(text, str)
     return text
 
 
-def module_of(tree: Tree) -> types.ModuleType:
+def module_of(tree: Tree, **options: str) -> types.ModuleType:
     module = types.ModuleType("exported")
-    exec(compile(export(tree), "<exported>", "exec"), module.__dict__)
+    exec(compile(export(tree, **options), "<exported>", "exec"), module.__dict__)
     return module
 
 
 def test_the_soda_tree(golden: Golden) -> None:
     golden("export/soda.py", export(soda_tree()))
+    golden("export/soda_imported.py", export(soda_tree(), runtime="imported"))
+    golden("export/soda_robot.py", export(soda_tree(), "py_trees_robot"))
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Exported modules that use everything, as files."""
+    """Exported modules that use everything, with their classes in them and imported, and a robot
+    for each, as files."""
     folder = tmp_path_factory.mktemp("exported")
     files = []
     made = [
@@ -63,26 +68,35 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         *(random_tree(seed, 0.6) for seed in range(12)),
     ]
     for number, tree in enumerate(made):
-        file = folder / f"tree_{number}.py"
-        file.write_text(export(tree), encoding="utf-8")
-        files.append(file)
+        for runtime in ("embedded", "imported"):
+            name = f"tree_{number}_{runtime}"
+            texts = {
+                f"{name}.py": export(tree, runtime=runtime),
+                f"{name}_robot.py": export(tree, "py_trees_robot", module=name, runtime=runtime),
+            }
+            for file, text in texts.items():
+                (folder / file).write_text(text, encoding="utf-8")
+                files.append(folder / file)
     return files
 
 
-def run_tool(*command: str) -> None:
-    done = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, check=False)
+def run_tool(cwd: Path, *command: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", *command], cwd=cwd, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ruff") is None, reason="ruff is not installed")
 def test_modules_pass_ruff(written: list[Path]) -> None:
     rules = "--select=E,F,W,I,B,UP,RET,SIM,PIE,PLW,ARG"
-    run_tool("ruff", "check", "--isolated", "--line-length=100", rules, *map(str, written))
+    run_tool(written[0].parent, "ruff", "check", "--isolated", "--line-length=100", rules, *map(str, written))
 
 
 @pytest.mark.skipif(importlib.util.find_spec("ruff") is None, reason="ruff is not installed")
 def test_modules_are_laid_out_as_ruff_would(written: list[Path]) -> None:
-    run_tool("ruff", "format", "--isolated", "--line-length", "100", "--check", *map(str, written))
+    folder, files = written[0].parent, map(str, written)
+    run_tool(folder, "ruff", "format", "--isolated", "--line-length", "100", "--check", *files)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("mypy") is None, reason="mypy is not installed")
@@ -90,24 +104,48 @@ def test_modules_pass_mypy_strict(written: list[Path], tmp_path: Path) -> None:
     empty = tmp_path / "mypy.ini"
     empty.write_text("[mypy]\n")
     cache = f"--cache-dir={tmp_path / 'cache'}"
-    run_tool("mypy", "--strict", f"--config-file={empty}", cache, *map(str, written))
+    run_tool(written[0].parent, "mypy", "--strict", f"--config-file={empty}", cache, *map(str, written))
 
 
-def test_the_module_runs_as_a_program(written: list[Path]) -> None:
-    def output(*arguments: str) -> str:
-        command = [sys.executable, str(written[0]), *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stdout
+def output(file: Path, *arguments: str) -> str:
+    command = [sys.executable, str(file), *arguments]
+    path = {"PYTHONPATH": str(REPOSITORY)}
+    done = subprocess.run(
+        command, env=os.environ | path, capture_output=True, text=True, check=True, timeout=60
+    )
+    return done.stdout
 
-    first = output("--seed", "3")
-    assert first == output("--seed", "3")
+
+@pytest.mark.parametrize("runtime", ["embedded", "imported"])
+def test_the_module_runs_as_a_program(written: list[Path], runtime: str) -> None:
+    module = written[0].with_name(f"tree_0_{runtime}.py")
+    first = output(module, "--seed", "3")
+    assert first == output(module, "--seed", "3")
     lines = first.splitlines()
     assert lines[0] == "light_on(): luminousity_ok() true"
     assert lines[1] in ("detect(soda): seen(soda) true", "detect(soda): seen(soda) false")
     ended = "SUCCESS" if lines[1].endswith("true") else "FAILURE"
     assert lines[2:] == [f"The tree returned {ended}."]
-    counted = output("--runs", "400").split()
+    counted = output(module, "--runs", "400").split()
     assert counted[1:] == ["of", "400", "runs", "succeeded."]
     assert 150 < int(counted[0]) < 250
+
+
+@pytest.mark.parametrize("runtime", ["embedded", "imported"])
+def test_the_robot_to_start_from_runs_and_tells_what_is_to_do(written: list[Path], runtime: str) -> None:
+    robot = written[0].with_name(f"tree_0_{runtime}_robot.py")
+    assert output(robot) == "to do: light_on\nThe tree returned FAILURE.\n"
+
+
+def test_modules_import_py_trees_the_standard_library_and_only_on_demand_bbtc(written: list[Path]) -> None:
+    ours = {file.stem for file in written}
+    for file in written:
+        statements = [
+            node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ImportFrom)
+        ]
+        modules = {str(node.module).partition(".")[0] for node in statements}
+        allowed = {"__future__", "py_trees"} | ({"bbtc"} if "imported" in file.stem else set())
+        assert modules - ours - sys.stdlib_module_names <= allowed
 
 
 @settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
@@ -121,7 +159,11 @@ def test_hostile_names_neither_become_code_nor_change_what_it_does(tree: Tree) -
     assert imports == {"argparse", "math", "random", "time"}
     named = {node.id for node in ast.walk(parsed) if isinstance(node, ast.Name)}
     leaves = py_trees_names(tree).interface.leaves.values()
-    assert named <= known_names() | {name for leaf in leaves for name in leaf.parameters}
+    parameters = {name for leaf in leaves for name in leaf.parameters}
+    assert named <= known_names() | parameters
+    robot = ast.parse(export(tree, "py_trees_robot", namespace=tree.task.problem))
+    assert {node.id for node in ast.walk(robot) if isinstance(node, ast.Name)} <= known_names() | parameters
+    assert set(used_in(export(tree, runtime="imported").splitlines())) <= known_names() | parameters
     replay = PyTreesReplay(tree)
     rng = random.Random(1)
     for _ in range(3):
@@ -130,44 +172,17 @@ def test_hostile_names_neither_become_code_nor_change_what_it_does(tree: Tree) -
 
 
 def known_names() -> set[str]:
-    """Names of variables that a module may refer to, whatever the tree."""
-    runtime = [runtime_source(name, _ALL) for name in ("pytrees_nodes", "simulated_world")]
-    text = "\n\n".join("\n".join(block) for blocks in runtime for block in blocks)
-    names = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
-    own = {
-        "ACTIONS",
-        "INITIAL",
-        "Protocol",
-        "Robot",
-        "SimulatedWorld",
-        "World",
-        "__name__",
-        "create_root",
-        "main",
+    """Names that a module may refer to, whatever the tree."""
+    runtime = [REPOSITORY / "bbtc" / "runtime" / f"{module}.py" for module in MODULES]
+    defined = {
+        node.name
+        for file in runtime
+        for node in ast.parse(file.read_text()).body
+        if isinstance(node, ast.ClassDef | ast.FunctionDef)
     }
-    used = {"Condition", "Latch", "StopWhenBlocked", "robot", "rng", "report", "s", "simulate", *_ALL}
-    return names | own | used | {"bool", "str", "self"}
-
-
-_ALL = [
-    *("all_of", "any_of", "negated", "Condition", "Action", "Latch", "Skipper", "sequence", "fallback"),
-    *(
-        "skipper",
-        "Retry",
-        "Try",
-        "retry",
-        "StopWhenBlocked",
-        "run",
-        "Fact",
-        "State",
-        "T",
-        "When",
-        "Outcome",
-        "Factor",
-        "draw",
-    ),
-    *("happen", "World", "in_words", "simulate"),
-]
+    own = {"ACTIONS", "INITIAL", "MyRobot", "Robot", "SimulatedWorld", "__all__", "__name__"}
+    own |= {"create_root", "main", "print", "report", "rng", "robot", "s"}
+    return defined | own | {name for file in runtime for name in used_in(file.read_text().splitlines())}
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,7 @@ def test_a_tree_that_nothing_can_unblock_fails(engine: Engine, timing: Timing) -
 def test_a_failure_of_the_real_action_is_withheld_and_kept() -> None:
     import py_trees
 
-    from bbtc.export.runtime.pytrees_nodes import Latch, StopWhenBlocked, fallback
+    from bbtc.runtime import Latch, StopWhenBlocked, fallback
 
     calls = []
 
@@ -107,7 +107,7 @@ def test_a_failure_of_the_real_action_is_withheld_and_kept() -> None:
 
     first = Latch("a", lambda: fail("a"), calls.append)
     second = Latch("b", lambda: fail("b"), calls.append)
-    root = StopWhenBlocked(fallback("try", first, second))
+    root = StopWhenBlocked(None, fallback("try", first, second))
     seen = []
     for _ in range(4):
         root.tick_once()

@@ -17,7 +17,7 @@ import random
 import time
 from collections.abc import Callable, Iterator
 from fractions import Fraction
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -144,7 +144,7 @@ class Latch(Decorator):
         # py_trees would interrupt the action that ran before only after this one has started: the
         # robot, asked for the same action by both, could not tell the second from the first.
         root: Behaviour = self
-        while root.parent is not None:
+        while root.parent is not None and not isinstance(root, StopWhenBlocked):
             root = root.parent
         for node in root.iterate():
             if isinstance(node, Latch) and node is not self and node.status == Status.RUNNING:
@@ -165,12 +165,25 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
     return Selector(name, memory=False, children=list(children))
 
 
-class StopWhenBlocked(Decorator):
-    """FAILURE where the tree is RUNNING but no action is: something is unknown that nothing can
-    observe, and nothing would ever change."""
+@runtime_checkable
+class WithSetup(Protocol):
+    """A robot that prepares itself before the first tick."""
 
-    def __init__(self, child: Behaviour) -> None:
+    def setup(self, **kwargs: Any) -> None:
+        """Called once, with what the owner of the tree hands on: in py_trees_ros, ``node``."""
+
+
+class StopWhenBlocked(Decorator):
+    """The root: FAILURE where the tree is RUNNING but no action is. Something is unknown then that
+    nothing can observe, and nothing would ever change."""
+
+    def __init__(self, robot: object, child: Behaviour) -> None:
         super().__init__(name="stop when blocked", child=child)
+        self._robot = robot
+
+    def setup(self, **kwargs: Any) -> None:
+        if isinstance(self._robot, WithSetup):
+            self._robot.setup(**kwargs)
 
     def update(self) -> Status:
         status = self.decorated.status
@@ -184,18 +197,25 @@ class StopWhenBlocked(Decorator):
 
 
 def run(root: Behaviour, period: float = 0.0) -> Status:
-    """Tick a tree until it ends, with a pause of ``period`` seconds between ticks."""
+    """Set a tree up and tick it until it ends, with a pause of ``period`` seconds between ticks.
+    An exception, such as that of Ctrl-C, cancels the action that runs."""
     tree = BehaviourTree(root)
-    while True:
-        tree.tick()
-        if root.status != Status.RUNNING:
-            return root.status
-        time.sleep(period)
+    tree.setup()
+    try:
+        while True:
+            tree.tick()
+            if root.status != Status.RUNNING:
+                return root.status
+            time.sleep(period)
+    finally:
+        if root.status == Status.RUNNING:
+            root.stop(Status.INVALID)
 
 
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
+        robot,
         sequence(
             "sequence",
             fallback(

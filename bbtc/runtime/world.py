@@ -12,7 +12,7 @@ from typing import TypeVar
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bbtc.export.runtime.pytrees_nodes import run
+from bbtc.runtime.nodes import run
 
 Fact = tuple[str, ...]
 State = dict[Fact, bool | None]

@@ -1,1 +1,0 @@
-"""Code that exported files carry with them. Real modules: type-checked and tested as they stand."""

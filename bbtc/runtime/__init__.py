@@ -1,0 +1,55 @@
+"""What exported py_trees modules need while they run. bbtc copies it into them, or, with ``-O
+runtime=imported``, they import it from here. It needs py_trees (2.2 or later) and nothing else."""
+
+from __future__ import annotations
+
+from bbtc.runtime.beliefs import Beliefs
+from bbtc.runtime.nodes import (
+    Action,
+    Condition,
+    Latch,
+    Retry,
+    Skipper,
+    StopWhenBlocked,
+    Try,
+    WithSetup,
+    all_of,
+    any_of,
+    fallback,
+    negated,
+    retry,
+    run,
+    sequence,
+    skipper,
+)
+from bbtc.runtime.world import Fact, Factor, Outcome, State, When, World, draw, happen, in_words, simulate
+
+__all__ = [
+    "Action",
+    "Beliefs",
+    "Condition",
+    "Fact",
+    "Factor",
+    "Latch",
+    "Outcome",
+    "Retry",
+    "Skipper",
+    "State",
+    "StopWhenBlocked",
+    "Try",
+    "When",
+    "WithSetup",
+    "World",
+    "all_of",
+    "any_of",
+    "draw",
+    "fallback",
+    "happen",
+    "in_words",
+    "negated",
+    "retry",
+    "run",
+    "sequence",
+    "simulate",
+    "skipper",
+]
