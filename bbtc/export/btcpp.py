@@ -16,7 +16,7 @@ from typing_extensions import assert_never
 from bbtc.export.btcpp_conditions import ConditionWriter
 from bbtc.export.btcpp_idioms import SKIPPER_LABEL, Idioms, Profile
 from bbtc.export.btcpp_names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
-from bbtc.export.btcpp_notes import TEMPLATE, notes
+from bbtc.export.btcpp_notes import TEMPLATE, notes, template_label
 from bbtc.export.btcpp_options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.export.btcpp_palette import node_model
 from bbtc.export.interface import action_symbol, guard_of, variable_symbol
@@ -183,7 +183,7 @@ class _Writer:
         inside = _Place(symbol, counters=place.counters, binding=binding, template=node)
         content: Element = yield self._written(node, inside)
         element = self._call(hoisted, content, tuple(binding.values()))
-        element.set("name", place.labels.unique(shown(template)))
+        element.set("name", place.labels.unique(template_label(template)))
         for arg, port in binding.items():
             element.set(port, self.conditions.value(arg, place.binding))
         return element

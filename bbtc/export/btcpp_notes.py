@@ -77,6 +77,12 @@ def kind_letter(node: Node) -> str:
             assert_never(node)
 
 
+def template_label(template: str) -> str:
+    """The name of a SubTree that stands for a template; never empty, which the engine would take for the
+    name of the main tree."""
+    return shown(template) or TEMPLATE
+
+
 def _exact(task: Task, node: Node) -> dict[str, object]:
     """What reading the file would give a node in another form."""
     found: dict[str, object] = {}
@@ -97,7 +103,7 @@ def _exact(task: Task, node: Node) -> dict[str, object]:
             assert_never(node)
     if node.name is not None and not _reads_back(node.name, default):
         found["name"] = node.name
-    if node.template is not None and without_number(shown(node.template)) != node.template:
+    if node.template is not None and without_number(template_label(node.template)) != node.template:
         found["template"] = node.template
     if node.reason is not None and (shown(node.reason) != node.reason or not node.reason):
         found["reason"] = node.reason
