@@ -1,7 +1,8 @@
 """The one registry of diagnostic codes and their titles.
 
 Ranges: 00xx files and limits, 01xx syntax, 02xx names and types, 03xx checks (warnings),
-04xx grounding, 05xx planning and trees, 06xx artefacts, 07xx exports.
+04xx grounding, 05xx planning and trees, 06xx artefacts, 07xx exports,
+08xx verification.
 """
 
 from __future__ import annotations
@@ -101,4 +102,9 @@ CODES: dict[str, str] = {
     "BBT0704": "wrong export option",
     "BBT0705": "tree too deep for the engine",
     "BBT0706": "no program can draw the picture",
+    # 08xx: verification
+    "BBT0801": "tree whose figures are not what it claims",
+    "BBT0802": "tree that is not sound",
+    "BBT0803": "Storm is not installed",
+    "BBT0804": "Storm gave no answer",
 }

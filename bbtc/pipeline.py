@@ -22,6 +22,7 @@ from bbtc.source import SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import Tree
 from bbtc.tree.validate import check_tree
+from bbtc.verify.verdict import Engine, Verdict, verify
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +220,12 @@ def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
     """The exact figures of a tree, and the chain they come from. Raises ``LimitReached``."""
     chain = explore(tree.task, tree.root, limits)
     return figures(tree.task, tree.root, chain), chain
+
+
+def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
+    """The figures of a tree, recomputed without the simulator and the planner. Raises
+    ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer."""
+    return verify(tree, limits, engine)
 
 
 def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limits) -> Artefact:

@@ -8,6 +8,7 @@ from bbtc.artefacts.numbers import figure_text, given_text, parse_number
 from bbtc.artefacts.stages_json import model_to_json, syntax_to_json
 from bbtc.artefacts.task_json import task_from_json, task_to_json
 from bbtc.artefacts.tree_json import tree_from_json, tree_to_json
+from bbtc.artefacts.verdict_json import verdict_to_json
 from bbtc.ground.task import Task
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import Tree
@@ -27,6 +28,7 @@ __all__ = [
     "task_to_json",
     "tree_from_json",
     "tree_to_json",
+    "verdict_to_json",
 ]
 
 

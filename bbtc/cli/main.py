@@ -19,6 +19,7 @@ COMMANDS = {
     "compile": "Parse, check and ground a problem into a task.",
     "plan": "Plan a tree that reaches the goal with the wanted probability.",
     "simulate": "Print the exact figures of a tree.",
+    "verify": "Recompute a tree's figures by other means, and compare.",
     "run": "Watch a tree tick against the simulated world.",
     "diff": "Tell what changed from one tree to another.",
     "export": "Write a tree for people or for an execution engine.",

@@ -86,12 +86,13 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
             word = "unknown" if share.status is Status.RUNNING else "false"
             what = f"{describe(tree.task, share.condition)} is {word}"
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")
-    lines.append(f"cost      {_expected(figures.cost, figures.cost_given_success)}")
-    lines.append(f"actions   {_expected(figures.actions, figures.actions_given_success)}")
+    lines.append(f"cost      {expected(figures.cost, figures.cost_given_success)}")
+    lines.append(f"actions   {expected(figures.actions, figures.actions_given_success)}")
     lines.append(f"states    {figures.states}")
     return lines
 
 
-def _expected(value: Fraction | None, given_success: Fraction | None) -> str:
+def expected(value: Fraction | None, given_success: Fraction | None) -> str:
+    """An expectation, overall (None: infinite) and given success (None: there is none)."""
     text = f"{exact(value)} expected" if value is not None else "infinite"
     return text + (f"; {exact(given_success)} given success" if given_success is not None else "")

@@ -1,0 +1,1 @@
+"""Independent recomputation: trees and tasks as programs in the PRISM language, and their solution."""

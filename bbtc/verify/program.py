@@ -1,0 +1,283 @@
+"""Markov chains and decision processes as programs of the PRISM language, as data.
+
+A program has *cells* (bounded integer variables), *commands* (guard, and a distribution over updates
+of the cells) and *labels* (sets of states). In a Markov chain one command is enabled in every state,
+in a decision process a policy picks one of those enabled. All right-hand sides read the state before
+the update. Source: Kwiatkowska, Norman, Parker, "PRISM 4.0" (2011), reactive modules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal, TypeAlias
+
+from typing_extensions import assert_never
+
+# --- expressions -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """The value of a cell, compared with a number."""
+
+    cell: int
+    relation: Literal["=", "<"]
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class AllOf:
+    """Conjunction."""
+
+    parts: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AnyOf:
+    """Disjunction."""
+
+    parts: tuple[Expression, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Negation:
+    """Negation."""
+
+    part: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Literally:
+    """True or false."""
+
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """The formula of this index."""
+
+    formula: int
+
+
+Expression: TypeAlias = Compare | AllOf | AnyOf | Negation | Literally | Use
+"""A two-valued expression."""
+
+YES, NO = Literally(True), Literally(False)
+
+
+def all_of(*parts: Expression) -> Expression:
+    """Conjunction, flattened, without constants, repeats and plain contradictions."""
+    kept: dict[Expression, None] = {}
+    for part in parts:
+        if part == NO:
+            return NO
+        if part != YES:
+            kept.update(dict.fromkeys(part.parts if isinstance(part, AllOf) else [part]))
+    if any(isinstance(part, Negation) and part.part in kept for part in kept):
+        return NO
+    return AllOf(tuple(kept)) if len(kept) > 1 else next(iter(kept), YES)
+
+
+def any_of(*parts: Expression) -> Expression:
+    """Disjunction, flattened, without constants, repeats and plain tautologies."""
+    kept: dict[Expression, None] = {}
+    for part in parts:
+        if part == YES:
+            return YES
+        if part != NO:
+            kept.update(dict.fromkeys(part.parts if isinstance(part, AnyOf) else [part]))
+    if any(isinstance(part, Negation) and part.part in kept for part in kept):
+        return YES
+    return AnyOf(tuple(kept)) if len(kept) > 1 else next(iter(kept), NO)
+
+
+def none_of(*parts: Expression) -> Expression:
+    """The negation of the disjunction."""
+    part = any_of(*parts)
+    match part:
+        case Literally(value):
+            return Literally(not value)
+        case Negation(inner):
+            return inner
+        case Compare() | AllOf() | AnyOf() | Use():
+            return Negation(part)
+        case _:
+            assert_never(part)
+
+
+def is_atom(expression: Expression) -> bool:
+    """Is it too small to deserve a name of its own?"""
+    return not isinstance(expression, AllOf | AnyOf)
+
+
+def parts_of(expression: Expression) -> tuple[Expression, ...]:
+    """The expressions directly inside."""
+    match expression:
+        case AllOf(parts) | AnyOf(parts):
+            return parts
+        case Negation(part):
+            return (part,)
+        case Compare() | Literally() | Use():
+            return ()
+        case _:
+            assert_never(expression)
+
+
+# --- programs --------------------------------------------------------------------------------
+
+CellKind: TypeAlias = Literal["variable", "done", "attempts", "pending", "control"]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A variable of a program, with values from 0 to ``highest``.
+
+    ``subject`` is what it is about (the ground predicate, the id of the node); ``meaning`` says in
+    words what its values stand for. Both hold names of the domain as they are.
+    """
+
+    kind: CellKind
+    subject: str
+    meaning: str
+    highest: int
+    initial: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A named expression. It uses earlier formulas only. ``subject`` is the id of a node."""
+
+    subject: str
+    aspect: str
+    expression: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """The cell gets the number of the first case that holds in the state before; without one it
+    keeps its value."""
+
+    cell: int
+    cases: tuple[tuple[Expression, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Increment:
+    """The cell is counted up by one."""
+
+    cell: int
+
+
+Update: TypeAlias = Choose | Increment
+
+
+def put(cell: int, number: int) -> Choose:
+    """The cell gets the number."""
+    return Choose(cell, ((YES, number),))
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """One thing that may happen: its probability, the cells it changes, and what it adds to each
+    reward of the program."""
+
+    probability: Fraction
+    updates: tuple[Update, ...]
+    rewards: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """``action`` is the ground action it starts, None where it starts none; ``remark`` is a comment.
+    The probabilities of the branches sum to 1."""
+
+    action: str | None
+    guard: Expression
+    branches: tuple[Branch, ...]
+    remark: str = ""
+
+    def reward(self, number: int) -> Fraction:
+        """The expectation of a reward over the branches."""
+        return sum((b.probability * b.rewards[number] for b in self.branches), Fraction(0))
+
+
+REWARDS = ("actions", "cost", "reward")
+"""What a program counts, in the order of :attr:`Branch.rewards`: actions started, their cost, and the
+task's reward."""
+
+Kind: TypeAlias = Literal["dtmc", "mdp"]
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A Markov chain (dtmc) or decision process (mdp). ``labels`` name sets of states; the one
+    called ``finished``, in a chain, holds those that are never left."""
+
+    kind: Kind
+    title: str
+    cells: tuple[Cell, ...]
+    formulas: tuple[Formula, ...]
+    commands: tuple[Command, ...]
+    labels: tuple[tuple[str, Expression], ...]
+
+    def label(self, name: str) -> Expression:
+        """The expression of a label. Raises ``KeyError``."""
+        return dict(self.labels)[name]
+
+    def roots(self) -> Iterator[Expression]:
+        """Every expression that is not part of another, those of the formulas left out."""
+        for command in self.commands:
+            yield command.guard
+            for branch in command.branches:
+                for update in branch.updates:
+                    if isinstance(update, Choose):
+                        yield from (condition for condition, _ in update.cases)
+        yield from (expression for _, expression in self.labels)
+
+
+@dataclass(slots=True)
+class Drafting:
+    """A program being written: cells and formulas get their numbers here."""
+
+    cells: list[Cell] = field(default_factory=list)
+    formulas: list[Formula] = field(default_factory=list)
+
+    def cell(self, cell: Cell) -> int:
+        """Add a cell; its number."""
+        self.cells.append(cell)
+        return len(self.cells) - 1
+
+    def define(self, subject: str, aspect: str, expression: Expression) -> Expression:
+        """The expression under a name, or itself if it is an atom."""
+        if is_atom(expression):
+            return expression
+        self.formulas.append(Formula(subject, aspect, expression))
+        return Use(len(self.formulas) - 1)
+
+
+def written_size(program: Program) -> int:
+    """How many atoms the program has with all formulas written out, as the tools that read it do."""
+    sizes: list[int] = []
+    for formula in program.formulas:
+        sizes.append(_size(formula.expression, sizes))
+    return sum(_size(root, sizes) for root in program.roots())
+
+
+def _size(expression: Expression, formulas: Sequence[int]) -> int:
+    if isinstance(expression, Use):
+        return formulas[expression.formula]
+    return sum((_size(part, formulas) for part in parts_of(expression)), 1)
+
+
+def nesting(expressions: Iterable[Expression]) -> int:
+    """The levels of the deepest of some expressions, formulas counted as atoms."""
+    deepest = 0
+    stack = [(expression, 1) for expression in expressions]
+    while stack:
+        expression, level = stack.pop()
+        deepest = max(deepest, level)
+        stack.extend((part, level + 1) for part in parts_of(expression))
+    return deepest
