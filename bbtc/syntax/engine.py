@@ -1,25 +1,20 @@
 """The LALR automaton of the grammar, run by a loop of our own.
 
-Lark reads the grammar and computes the tables, in the form that its generator of stand-alone parsers
-writes. Its own loop makes an object with line and column for every token and one more for every rule,
-which takes three times as long as the loop below; and planning files come in megabytes.
+Lark computes the tables (:mod:`bbtc.syntax.tables`). Its own loop makes an object with line and column for
+every token and one more for every rule, which takes three times as long as the loop below; and planning
+files come in megabytes.
 """
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
-from lark import Lark
-from lark.grammar import Rule
-from lark.lexer import TerminalDef
+from bbtc.syntax.tables import END, FLAGS, Production, Tables
 
-END = "$END"
-_FLAGS = re.IGNORECASE | re.ASCII
-_SPACE = re.compile(r"\s*", _FLAGS)
+_SPACE = re.compile(r"\s*", FLAGS)
 
 
 class Token(NamedTuple):
@@ -29,37 +24,6 @@ class Token(NamedTuple):
     text: str
     start: int
     end: int
-
-
-class Production(NamedTuple):
-    """A rule of the grammar."""
-
-    origin: str
-    size: int
-    splice: tuple[int, ...]
-    """Positions of the children that are lists to be laid open: those of rules whose name starts
-    with ``_``."""
-    call: str | None
-    """Name of the builder's method; None for a list to be laid open."""
-    single: bool
-    """A single child stands for the whole (``?rule``)."""
-    grows: bool
-    """A list rule of the form ``list: list item``."""
-
-
-@dataclass(frozen=True, slots=True)
-class Tables:
-    """An LALR automaton, as plain data."""
-
-    start: int
-    end: int
-    productions: tuple[Production, ...]
-    actions: Mapping[int, Mapping[str, int]]
-    """By state and terminal: the next state, or ``-1 - n`` to reduce production n."""
-    goto: Mapping[int, Mapping[str, int]]
-    """By state and rule: the next state."""
-    terminals: Mapping[str, str]
-    """Regular expression of each terminal, in the order in which they are tried."""
 
 
 # What completing a production does to the stack of values.
@@ -78,52 +42,6 @@ class Unexpected(Exception):
 
 class TooDeep(Exception):
     """The stack of states is higher than allowed."""
-
-
-def make_tables(grammar: str, start: str) -> Tables:
-    """The automaton of a Lark grammar."""
-    lark = Lark(grammar, parser="lalr", lexer="contextual", start=start, g_regex_flags=_FLAGS)
-    data, memo = lark.memo_serialize([TerminalDef, Rule])
-    table = data["parser"]["parser"]
-    terminals = sorted(lark.terminals, key=lambda t: (-t.priority, -len(t.pattern.to_regexp()), t.name))
-    kinds = {terminal.name for terminal in terminals} | {END}
-    productions: dict[int, Production] = {
-        number: _production(rule) for number, rule in memo.items() if rule["__type__"] == "Rule"
-    }
-    position = {number: at for at, number in enumerate(productions)}
-    actions: dict[int, dict[str, int]] = {}
-    goto: dict[int, dict[str, int]] = {}
-    for state, row in table["states"].items():
-        cells = {table["tokens"][symbol]: cell for symbol, cell in row.items()}
-        actions[state] = {
-            symbol: -1 - position[target["@"]] if reduces else target
-            for symbol, (reduces, target) in cells.items()
-            if symbol in kinds
-        }
-        goto[state] = {symbol: target for symbol, (_, target) in cells.items() if symbol not in kinds}
-    return Tables(
-        table["start_states"][start],
-        table["end_states"][start],
-        tuple(productions.values()),
-        actions,
-        goto,
-        {
-            terminal.name: terminal.pattern.to_regexp()
-            for terminal in terminals
-            if terminal.name not in lark.ignore_tokens
-        },
-    )
-
-
-def _production(rule: Mapping[str, Any]) -> Production:
-    origin = rule["origin"]["name"]
-    expansion = [symbol["name"] for symbol in rule["expansion"]]
-    splice = tuple(at for at, name in enumerate(expansion) if name.startswith("_"))
-    alias = rule["alias"]
-    single = bool(rule["options"]["expand1"]) and len(expansion) == 1 and alias is None and not splice
-    call = None if origin.startswith("_") else alias or origin
-    grows = call is None and splice == (0,) and len(expansion) == 2 and expansion[0] == origin
-    return Production(origin, len(expansion), splice, call, single, grows)
 
 
 class Engine:
@@ -225,7 +143,7 @@ class Engine:
             choices = "|".join(
                 f"(?P<{kind}>{regex})" for kind, regex in self.terminals.items() if kind in kinds
             )
-            self._compiled[kinds] = re.compile(rf"(?:{choices or '(?!)'})\s*", _FLAGS).match
+            self._compiled[kinds] = re.compile(rf"(?:{choices or '(?!)'})\s*", FLAGS).match
         self._scanners[state] = self._compiled[kinds]
         return self._compiled[kinds]
 

@@ -6,8 +6,8 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
-from bbtc.syntax.engine import END
 from bbtc.syntax.scan import Fault
+from bbtc.syntax.tables import END
 
 CONNECTIVES = (
     "and",

@@ -6,32 +6,23 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from importlib.resources import files
-from pathlib import Path
 
 from bbtc.diagnostics import Report
 from bbtc.source import SourceFile, Span
 from bbtc.syntax import ast, scan
 from bbtc.syntax.build import Builder
-from bbtc.syntax.engine import Engine, TooDeep, Unexpected, make_tables
+from bbtc.syntax.engine import Engine, TooDeep, Unexpected
 from bbtc.syntax.leaves import SOURCE, Misuse
 from bbtc.syntax.recover import recovered
+from bbtc.syntax.tables import tables
 
 MAX_DEPTH = 100
 """Deepest nesting of parentheses that is read unless the caller allows more."""
 
 
-def grammar_text() -> str:
-    """The grammar of the language: package data in a wheel, ``grammar/bbtc.lark`` in a checkout."""
-    packaged = files("bbtc") / "grammar" / "bbtc.lark"
-    if packaged.is_file():
-        return packaged.read_text("utf-8")
-    return (Path(__file__).parents[2] / "grammar" / "bbtc.lark").read_text("utf-8")
-
-
 @lru_cache(maxsize=1)
 def _engine() -> Engine:
-    return Engine(make_tables(grammar_text(), "document"), Builder())
+    return Engine(tables(), Builder())
 
 
 def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast.Document:
