@@ -15,7 +15,7 @@ from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, v
 from bbtc.ground.task import GroundAction, Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.plan.draft import Doing, Subgoal, changed_by
-from bbtc.plan.relaxed import RelaxedReachability, possible
+from bbtc.plan.relaxed import RelaxedReachability, helpful, possible
 
 OPEN_SHARE = Fraction(1, 2)
 """An outcome that leaves a false condition unknown counts this much: it may still be observed true."""
@@ -79,14 +79,13 @@ class Chooser:
         self.task = task
         self.transitions = transitions
         self.reachability = RelaxedReachability(task)
-        self._by_variable: dict[int, list[Doing]] = {}
+        self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
         self._helps: dict[tuple[Subgoal, int, Truth, Values, frozenset[str]], bool] = {}
         doings: list[Doing] = [*task.actions, *task.templates]
         for doing in doings:
-            touched = {variable for effect in effects_of(doing.factors) for variable, _ in effect.sets}
-            for variable in sorted(touched):
-                self._by_variable.setdefault(variable, []).append(doing)
+            for fact in sorted({fact for effect in effects_of(doing.factors) for fact in effect.sets}):
+                self._by_fact.setdefault(fact, []).append(doing)
 
     def helps(self, target: Target) -> bool:
         """Is there any candidate for a target of one state?"""
@@ -106,8 +105,8 @@ class Chooser:
             if attempt.doing is not None
         }
         doings: dict[str, Doing] = {}
-        for variable in variables(goal):
-            for doing in self._by_variable.get(variable, ()):
+        for fact in helpful(goal, target.value):
+            for doing in self._by_fact.get(fact, ()):
                 if doing.name not in ongoing and doing.name not in target.excluded:
                     doings[doing.name] = doing
         found: list[Candidate] = []
@@ -122,7 +121,7 @@ class Chooser:
         not hold in the target's states, with the guard as a further precondition."""
         goal = target.subgoal.condition
         conditions = conjuncts(doing.precondition)
-        if any(_circular(condition, goal, target.value) for condition in conditions):
+        if any(circular(condition, goal, target.value) for condition in conditions):
             return
         states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
         if not states:
@@ -135,7 +134,7 @@ class Chooser:
             return
         for guard in _guards(doing, frozenset(variables(goal))):
             more = (*conditions, *(c for c in conjuncts(guard) if c not in conditions))
-            if any(_circular(c, goal, target.value) for c in more):
+            if any(circular(c, goal, target.value) for c in more):
                 continue
             reachable = [(s, p) for s, p in states if self._applicable(more, s)]
             forced = _forced(guard)
@@ -212,7 +211,7 @@ class Chooser:
                 yield Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
 
 
-def _circular(condition: Condition, goal: Condition, value: Truth) -> bool:
+def circular(condition: Condition, goal: Condition, value: Truth) -> bool:
     """Does a precondition ask for the goal itself, or for the value of what is unknown?"""
     if condition == goal:
         return True

@@ -9,6 +9,9 @@ can find the place of an insertion; :func:`freeze` turns it into nodes:
 * an attempt is ``Sequence(preconditions…, action or template body, post-check)``. The post-check
   of an observation is ``known(c)``, that of an action is ``c`` itself.
 
+In a reactive draft actions are not latched: an attempt tries again for as long as its place in the tree
+asks for it, and needs no post-check.
+
 Preconditions that the place of an attempt already implies are left out (:func:`_implied`). Node
 ids are given when a node is first needed and never change, so a refinement leaves the ids of what
 stood before it alone.
@@ -17,7 +20,7 @@ stood before it alone.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from typing_extensions import assert_never
@@ -100,11 +103,31 @@ class Draft:
     goals: list[Subgoal]
     ids: dict[str, str] = field(default_factory=dict)
     next_id: int = 1
+    reactive: bool = False
 
     @classmethod
-    def start(cls, task: Task) -> Draft:
+    def start(cls, task: Task, *, reactive: bool = False) -> Draft:
         """The draft the paper starts from: the goal's conditions, nothing inserted."""
-        return cls(task, [Subgoal(part, None) for part in conjuncts(task.goal) or (task.goal,)])
+        goals = [Subgoal(part, None) for part in conjuncts(task.goal) or (task.goal,)]
+        return cls(task, goals, reactive=reactive)
+
+    def copied(self) -> tuple[Draft, dict[Subgoal, Subgoal]]:
+        """A draft of its own, and its subgoals by those they are copies of."""
+        copies: dict[Subgoal, Subgoal] = {}
+
+        def subgoal(old: Subgoal, parent: Attempt | None) -> Subgoal:
+            new = copies[old] = Subgoal(old.condition, parent, ids=dict(old.ids))
+            new.sensing = [attempt(each, new) for each in old.sensing]
+            new.acting = [attempt(each, new) for each in old.acting]
+            return new
+
+        def attempt(old: Attempt, of: Subgoal) -> Attempt:
+            new = Attempt(of, old.doing, ids=dict(old.ids))
+            new.preconditions = [subgoal(each, new) for each in old.preconditions]
+            return new
+
+        goals = [subgoal(goal, None) for goal in self.goals]
+        return replace(self, goals=goals, ids=dict(self.ids)), copies
 
 
 def new_attempt(subgoal: Subgoal, doing: Doing | None, conditions: list[Condition]) -> Attempt:
@@ -195,6 +218,8 @@ class _Freezer:
             else:
                 children.append(self.subgoal(precondition))
         children.extend(self.doing(attempt))
+        if self.draft.reactive and isinstance(attempt.doing, GroundAction):
+            return self.control(attempt.ids, "sequence", "sequence", children)
         post = conjunction(Known(v) for v in dict.fromkeys(variables(goal))) if sensing else goal
         children.append(self.check(subgoal, attempt.ids, "post", post))
         return ControlNode(
@@ -213,7 +238,8 @@ class _Freezer:
                 assert_never(attempt.doing)
 
     def action(self, attempt: Attempt, role: str, name: str, *, guarded: bool) -> Node:
-        node = ActionNode(self.id(attempt.ids, role), name, guarded=guarded)
+        latched = not self.draft.reactive
+        node = ActionNode(self.id(attempt.ids, role), name, latched=latched, guarded=guarded)
         self.actions[node.id] = attempt
         self.owners[node.id] = Owner(None, attempt)
         return node

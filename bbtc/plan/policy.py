@@ -20,11 +20,12 @@ from bbtc.plan.policy_budget import phases
 from bbtc.plan.policy_retry import longest_run, with_least_attempts
 from bbtc.plan.policy_space import best_offers
 from bbtc.plan.result import Plan, Progress
+from bbtc.plan.simplify import numbered, size
 from bbtc.plan.space import explore_space
-from bbtc.plan.synthesis_tree import in_phases, numbered, synthesize
+from bbtc.plan.synthesis_tree import in_phases, synthesize
 from bbtc.plan.value import Bounds, best_probability, reachability
 from bbtc.plan.value_horizon import horizon_values
-from bbtc.tree.nodes import ConditionNode, Node, Status, Tree, walk
+from bbtc.tree.nodes import ConditionNode, Node, Status, Tree
 
 
 @dataclass(slots=True)
@@ -78,7 +79,7 @@ class _Search:
         self._keep(in_phases(self.task, [(part.steps, part.offers) for part in parts], self.limits))
 
     def _keep(self, root: Node) -> None:
-        self.limits.check_nodes(sum(1 for _ in walk(root)))
+        self.limits.check_nodes(size(root))
         self.root = root
 
 

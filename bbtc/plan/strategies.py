@@ -13,6 +13,7 @@ from bbtc.plan.result import Plan, Progress, Strategy
 
 STRATEGIES = {
     "refine": ("bbtc.plan.refine", "refine"),
+    "search": ("bbtc.plan.search", "plan_search"),
     "policy": ("bbtc.plan.policy", "plan_policy"),
     "auto": ("bbtc.plan.auto", "plan_auto"),
 }
@@ -32,12 +33,12 @@ def run_strategy(
         )
     module, function = STRATEGIES[name]
     strategy: Strategy = getattr(import_module(module), function)
+    if name in {"refine", "search"} and options.max_actions is not None:
+        raise BbtcError.single(
+            "BBT0503",
+            f"the strategy '{name}' does not plan within a number of actions",
+            hint="use --strategy policy",
+        )
     if name == "refine":
-        if options.max_actions is not None:
-            raise BbtcError.single(
-                "BBT0503",
-                f"the strategy '{name}' does not plan within a number of actions",
-                hint="use --strategy policy",
-            )
         return strategy(task, target, limits, progress)
     return strategy(task, target, limits, progress, options)

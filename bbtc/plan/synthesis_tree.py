@@ -19,6 +19,7 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.plan.policy_space import Offers
+from bbtc.plan.simplify import numbered
 from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags
 from bbtc.plan.synthesis_rules import Learner, Literal, Rule, Test
@@ -60,21 +61,6 @@ def _tree(task: Task, offers: Offers, limits: Limits, *, fall_through: bool) -> 
         node = _control("skipper", [node, ConditionNode("", FALSE)])
     children = build.rules(acting)
     return _control("fallback", [node, *children]) if children else node
-
-
-def numbered(root: Node) -> Node:
-    """The tree with ids ``n1``, ``n2``, … from the root down, from left to right."""
-    count = 0
-
-    def visit(node: Node) -> Node:
-        nonlocal count
-        count += 1
-        node = replace(node, id=f"n{count}")
-        if isinstance(node, ControlNode):
-            return replace(node, children=tuple([visit(child) for child in node.children]))
-        return node
-
-    return visit(root)
 
 
 def _truths(condition: Condition, values: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:

@@ -58,6 +58,40 @@ def brute_force(task: Task, root: Node) -> Totals:
     return totals
 
 
+History = tuple[object, ...]
+"""A run: the values at the start, an action and the values after it, again and again, and how it ended
+(missing where it was cut)."""
+
+
+def runs_of(task: Task, root: Node, most: int) -> dict[History, Fraction]:
+    """Every run of any tree with its probability, cut after so many actions."""
+    found: dict[History, Fraction] = {}
+    waiting = []
+    for state in task.initial:
+        values = tuple(int(value) for value in state.values)
+        waiting.append(((values,), Ticking(task, values), state.probability))
+    while waiting:
+        history, run, probability = waiting.pop()
+        if not probability:
+            continue
+        run.started = None
+        status = run.tick(root)
+        node = run.started_now()
+        if node is None or len(history) > 2 * most:
+            end = (*history, status) if node is None else history
+            found[end] = found.get(end, Fraction(0)) + probability
+            continue
+        finished = run.finished | {node.id} if node.latched else run.finished
+        results: dict[Values, Fraction] = {}
+        for chance, sets, _, _ in _every(task.action_by_name[node.action].factors, run.values):
+            after = _changed(run.values, sets)
+            results[after] = results.get(after, Fraction(0)) + chance
+        for after, chance in results.items():
+            following = Ticking(task, after, set(finished), dict(run.tries))
+            waiting.append(((*history, node.action, after), following, probability * chance))
+    return found
+
+
 _Sets = tuple[tuple[int, int], ...]
 
 

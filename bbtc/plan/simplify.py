@@ -1,0 +1,200 @@
+"""Smaller trees that do the same: no simplification changes what happens in any run.
+
+1. A child that only ever lets its parent go on to the next one is taken out; so is what stands behind a
+   child that never does, and what is never ticked. A control node in one of its own kind, or with one
+   child, dissolves. What a node ever returns is read off every state that a run can visit, so this changes
+   nothing there.
+2. Neighbours that share a child share one copy of it: ``Fallback(Sequence(a, x), Sequence(a, y))`` becomes
+   ``Sequence(a, Fallback(x, y))``, and the like from behind; of equal neighbours one stays. Where the shared
+   test is not the first, the tests are put into another order. This is kept only if both trees, run side by
+   side, do the same (:mod:`bbtc.belief.same_runs`).
+
+The result as a whole is compared with the tree given, in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from bbtc.belief.chain import Chain, explore
+from bbtc.belief.same_runs import same_runs
+from bbtc.belief.state import Transition
+from bbtc.belief.tick import Status, compile_tick
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
+
+GOES_ON: dict[ControlKind, Status] = {
+    "sequence": Status.SUCCESS,
+    "fallback": Status.FAILURE,
+    "skipper": Status.RUNNING,
+}
+"""After which status of a child a control node ticks the next one."""
+
+_MOST_PAIRS = 200
+"""Shared copies that are tried."""
+
+
+def simplified(
+    task: Task, root: Node, limits: Limits, transitions: dict[str, Transition] | None = None
+) -> Node:
+    """The tree made smaller, its runs unchanged. Raises ``LimitReached``; ``AssertionError`` if what
+    was found does something else, which is a bug."""
+    chain = explore(task, root, limits, transitions)
+    found = root
+    while True:
+        smaller = _without_idle(
+            task, found, chain if found is root else explore(task, found, limits, transitions)
+        )
+        shared = _shared(task, smaller, chain, limits)
+        if shared is None:
+            break
+        found = shared
+    if not same_runs(task, chain, smaller):
+        raise AssertionError("a simplification changed what a tree does")
+    return smaller
+
+
+def size(root: Node) -> int:
+    """The number of nodes."""
+    return sum(1 for _ in walk(root))
+
+
+def numbered(root: Node) -> Node:
+    """The tree with ids ``n1``, ``n2``, … from the root down, from left to right."""
+    count = 0
+
+    def visit(node: Node) -> Node:
+        nonlocal count
+        count += 1
+        node = replace(node, id=f"n{count}")
+        if isinstance(node, ControlNode):
+            return replace(node, children=tuple([visit(child) for child in node.children]))
+        return node
+
+    return visit(root)
+
+
+# --- what never matters ----------------------------------------------------------------------
+
+
+def _without_idle(task: Task, root: Node, chain: Chain) -> Node:
+    """Step 1, until nothing more is found."""
+    returned: dict[str, set[int]] = {node.id: set() for node in walk(root)}
+    tick = compile_tick(task, root, lambda node, status: returned[node.id].add(status))
+    for state in chain.states:
+        tick(state.values, state.finished)
+
+    def kept(node: Node) -> Node:
+        if not isinstance(node, ControlNode) or node.template is not None:
+            return node
+        if node.kind == "retry":
+            return replace(node, children=(kept(node.children[0]),))
+        goes_on = GOES_ON[node.kind]
+        children: list[Node] = []
+        for child in node.children:
+            seen = returned[child.id]
+            if seen and seen != {int(goes_on)}:
+                children.extend(_dissolved(node.kind, kept(child)))
+            if goes_on not in seen:
+                break  # what follows is never ticked
+        if not children:
+            children = [kept(node.children[0])]
+        if len(children) == 1:
+            return children[0]
+        return replace(node, children=tuple(children))
+
+    return kept(root)
+
+
+def _dissolved(kind: ControlKind, child: Node) -> Sequence[Node]:
+    if isinstance(child, ControlNode) and child.kind == kind and child.template is None:
+        return child.children
+    return (child,)
+
+
+# --- what stands twice -----------------------------------------------------------------------
+
+
+def _shared(task: Task, root: Node, chain: Chain, limits: Limits) -> Node | None:
+    """Step 2, once: the first smaller tree that does the same; None if there is none."""
+    for tried, smaller in enumerate(_merged(root)):
+        limits.check_time("the search for a small tree")
+        if tried == _MOST_PAIRS:
+            break
+        if same_runs(task, chain, smaller):
+            return numbered(smaller)
+    return None
+
+
+def _merged(node: Node) -> Iterator[Node]:
+    """Trees with two neighbours merged, which may or may not do the same."""
+    if not isinstance(node, ControlNode) or node.template is not None:
+        return
+    if node.kind in {"fallback", "sequence"}:
+        inner: ControlKind = "sequence" if node.kind == "fallback" else "fallback"
+        for at in range(len(node.children) - 1):
+            for merged in _pair(node, inner, node.children[at], node.children[at + 1]):
+                children = (*node.children[:at], merged, *node.children[at + 2 :])
+                yield merged if len(children) == 1 else replace(node, children=children)
+    for at, child in enumerate(node.children):
+        for smaller in _merged(child):
+            yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))
+
+
+def _pair(above: ControlNode, inner: ControlKind, one: Node, other: Node) -> Iterator[Node]:
+    if _same(one, other):
+        yield one
+        return
+    first, second = _parts(inner, one), _parts(inner, other)
+    if isinstance(other, ControlNode) and len(second) > 1:
+        for part in first:
+            for twin in second:
+                if isinstance(part, ControlNode) or not _same(part, twin):
+                    continue
+                rest = [
+                    _control(other, inner, [c for c in side if c is not p])
+                    for side, p in ((first, part), (second, twin))
+                ]
+                if any(each is None for each in rest):
+                    continue
+                choice = ControlNode(
+                    f"{other.id}.or", above.kind, tuple(each for each in rest if each is not None)
+                )
+                order = (part, choice) if isinstance(part, ConditionNode) else (choice, part)
+                yield replace(other, kind=inner, children=order)
+
+
+def _parts(kind: ControlKind, node: Node) -> tuple[Node, ...]:
+    if isinstance(node, ControlNode) and node.kind == kind and node.template is None:
+        return node.children
+    return (node,)
+
+
+def _control(like: ControlNode, kind: ControlKind, children: Sequence[Node]) -> Node | None:
+    if len(children) < 2:
+        return children[0] if children else None
+    return ControlNode(f"{children[0].id}.{kind}", kind, tuple(children), reason=like.reason)
+
+
+def _same(one: Node, other: Node) -> bool:
+    """Are two subtrees equal but for ids, and without memory?"""
+    match one, other:
+        case ConditionNode(), ConditionNode():
+            return one.condition == other.condition
+        case ActionNode(), ActionNode():
+            return (
+                one.action == other.action
+                and not one.latched
+                and not other.latched
+                and one.guarded == other.guarded
+            )
+        case ControlNode(), ControlNode():
+            return (
+                one.kind == other.kind != "retry"
+                and len(one.children) == len(other.children)
+                and all(map(_same, one.children, other.children))
+            )
+        case _:
+            return False
