@@ -3,8 +3,8 @@
 Run ``python -m tests.fuzz.fuzz_front_end FOLDER [SECONDS]`` (atheris is not a dependency: install it
 first). Seeds are the pairs of the corpus and of ``domains/`` that are small; they, and the inputs that
 reach new code, stand in ``FOLDER/seeds``. Every find goes to ``FOLDER/finds``, one file for each place
-in the code that it fails at, with the traceback beside it, and the run goes on. Finds become regression
-cases in ``tests/fuzz/regressions/``.
+in the code that it fails at, with the traceback beside it, and the run goes on; ``FOLDER/tally-….json``
+counts how far the inputs came. Finds become regression cases in ``tests/fuzz/regressions/``.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ with atheris.instrument_imports(include=["bbtc"]):
     from tests.fuzz.front_end import check_input
 
 from tests.conftest import REPOSITORY, corpus_folder
+from tests.fuzz.mutate import Changes
 
 _LONGEST = 2048  # bytes: what is long is slow, and fails for the same reasons
-_WORD = re.compile(rb"[^\s()]+")
-_FORM = re.compile(rb"\([^()]*\)|[^\s()]+")
+_POOL, _KNOWN = 3000, 30_000
 
 
 def write_seeds(folder: Path) -> list[bytes]:
@@ -67,70 +67,60 @@ def _squeezed(text: bytes) -> bytes:
     return re.sub(rb"\n\s+", b"\n", re.sub(rb"[ \t]+", b" ", text))
 
 
-class Mutator:
-    """Changes some of the inputs byte by byte, most of them form by form or word by word: those get
-    further than the parser."""
+class Pool:
+    """Inputs that got past the parser: the seeds, and later ones that take the places of others."""
 
     def __init__(self, seeds: list[bytes]) -> None:
         self.seeds = seeds
+        self.texts = list(seeds)
+        self._draw = random.Random(0)
+        self._known: dict[bytes, None] = dict.fromkeys(map(_checksum, seeds))
+
+    def add(self, data: bytes) -> None:
+        """Keep some of the inputs; forget the oldest of very many checksums."""
+        self._known[_checksum(data)] = None
+        if len(self._known) > _KNOWN:
+            del self._known[next(iter(self._known))]
+        if len(self.texts) < _POOL:
+            self.texts.append(data)
+        elif self._draw.random() < 0.1:
+            self.texts[self._draw.randrange(len(self.seeds), _POOL)] = data
+
+    def __contains__(self, data: bytes) -> bool:
+        return _checksum(data) in self._known
+
+
+def _checksum(data: bytes) -> bytes:
+    return hashlib.sha1(data, usedforsecurity=False).digest()
+
+
+class Mutator:
+    """Changes one input in ten byte by byte, the others form by form and word by word. What the parser
+    refused is seldom changed further: more of it would be refused, too."""
+
+    def __init__(self, pool: Pool) -> None:
+        self.pool = pool
 
     def __call__(self, data: bytes, max_size: int, seed: int) -> bytes:
         """A changed input of at most ``max_size`` bytes."""
         draw = random.Random(seed)
-        if draw.random() < 0.3 or not data:
+        if not data or (data not in self.pool and draw.random() < 0.85):
+            data = draw.choice(self.pool.texts)
+        if draw.random() < 0.1:
             return bytes(atheris.Mutate(data, max_size))
-        for _ in range(draw.choice([1, 1, 1, 2, 3])):
-            data = self._step(data, draw)
-        return data[:max_size]
-
-    def _step(self, data: bytes, draw: random.Random) -> bytes:
-        start, end = _form(data, draw)
-        other = data if draw.random() < 0.5 or not self.seeds else draw.choice(self.seeds)
-        from_, to = _form(other, draw)
-        match draw.randrange(8):
-            case 5 | 6 | 7:
-                # One word instead of another: names that are declared, numbers, keywords.
-                words = [*_WORD.finditer(data)]
-                if len(words) < 2:
-                    return data
-                at, new = draw.choice(words), draw.choice(words).group()
-                return data[: at.start()] + new + data[at.end() :]
-            case 0:
-                return data[:start] + data[end:]
-            case 1:
-                return data[:end] + b" " + data[start:end] + data[end:]
-            case 2:
-                return data[:start] + other[from_:to] + data[end:]
-            case 3:
-                return data[:end] + b" " + other[from_:to] + data[end:]
-            case _:
-                wrapper = draw.choice(
-                    [b"(and %s)", b"(not %s)", b"(oneof %s)", b"(probabilistic 1/2 %s)", b"(when (p) %s)",
-                     b"(forall (?x) %s)", b"(exists (?x - object) %s)", b"(unknown %s)", b"(or %s)",
-                     b"(imply (q) %s)", b"(known %s)", b"(%s)"]
-                )  # fmt: skip
-                return data[:start] + wrapper.replace(b"%s", data[start:end]) + data[end:]
-
-
-def _form(data: bytes, draw: random.Random) -> tuple[int, int]:
-    """The place of a word or of a form in parentheses."""
-    at = draw.randrange(len(data)) if data else 0
-    if draw.random() < 0.5:
-        match = _FORM.search(data, at)
-        return (match.start(), match.end()) if match else (at, at)
-    start = data.rfind(b"(", 0, at)
-    depth = 0
-    for end in range(max(start, 0), len(data)):
-        depth += (data[end] == 0x28) - (data[end] == 0x29)
-        if depth == 0:
-            return max(start, 0), end + 1
-    return at, at
+        change = Changes(self.pool.texts, draw)
+        for _ in range(draw.choice([1, 1, 2, 2, 3, 5])):
+            changed = change(data)
+            if len(changed) <= max_size:
+                data = changed
+        return data
 
 
 class Run:
     """Counts the executions and keeps the finds."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, pool: Pool) -> None:
+        self.pool = pool
         self.finds = folder / "finds"
         self.finds.mkdir(parents=True, exist_ok=True)
         self.tally = folder / f"tally-{int(time.time())}.json"
@@ -140,7 +130,10 @@ class Run:
     def __call__(self, data: bytes) -> None:
         """Try one input."""
         try:
-            self.reached[check_input(data)] += 1
+            reached = check_input(data)
+            self.reached[reached] += 1
+            if reached != "refused":
+                self.pool.add(data)
         except Exception as error:  # noqa: BLE001
             self.reached["find"] += 1
             self._keep(data, error)
@@ -159,6 +152,13 @@ class Run:
             (self.finds / f"{name}.txt").write_text(trace)
 
 
+def _gets_past(seed: bytes) -> bool:
+    try:
+        return check_input(seed) != "refused"
+    except AssertionError:
+        return False
+
+
 def main() -> None:
     """Fuzz until the time is over."""
     folder = Path(sys.argv[1])
@@ -173,7 +173,10 @@ def main() -> None:
         f"-max_total_time={seconds}", f"-max_len={_LONGEST}", "-timeout=60", "-rss_limit_mb=3000",
         f"-dict={keys}", f"-artifact_prefix={folder}/crash-", "-verbosity=1", "-len_control=0",
     ]  # fmt: skip
-    atheris.Setup([sys.argv[0], *options, str(folder / "seeds")], Run(folder), custom_mutator=Mutator(seeds))
+    pool = Pool([seed for seed in seeds if _gets_past(seed)])
+    atheris.Setup(
+        [sys.argv[0], *options, str(folder / "seeds")], Run(folder, pool), custom_mutator=Mutator(pool)
+    )
     atheris.Fuzz()
 
 
