@@ -63,8 +63,7 @@ def command(
 def _scenario_lines(tree: Tree, chain: Chain, count: int) -> list[str]:
     from bbtc.belief.scenarios import scenarios as runs
     from bbtc.belief.tick import Status
-    from bbtc.cli.wording import exact
-    from bbtc.kleene import Truth
+    from bbtc.cli.wording import changes, exact
 
     lines = []
     for number, run in enumerate(itertools.islice(runs(chain), count), 1):
@@ -72,11 +71,6 @@ def _scenario_lines(tree: Tree, chain: Chain, count: int) -> list[str]:
         lines.append(f"run {number}: probability {exact(run.probability)}, {ending}")
         before = run.initial
         for step in run.steps:
-            changed = [
-                f"{variable.name} = {Truth(new).word}"
-                for variable, old, new in zip(tree.task.variables, before, step.values, strict=True)
-                if old != new
-            ]
-            lines.append(f"  {step.node.action}: {', '.join(changed) or 'no change'}")
+            lines.append(f"  {step.node.action}: {changes(tree, before, step.values)}")
             before = step.values
     return lines

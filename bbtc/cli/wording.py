@@ -4,29 +4,31 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+from bbtc.artefacts.numbers import exact
 from bbtc.belief.simulate import Figures
 from bbtc.belief.tick import Status
+from bbtc.cli.counting import counted
+from bbtc.export.names import printable
 from bbtc.ground.describe import describe
 from bbtc.kleene import Truth
 from bbtc.plan.result import Plan, Refinement
 from bbtc.tree.nodes import Tree, retries_of
 
-_LONGEST_FRACTION = 25
+__all__ = [
+    "changes",
+    "counted",
+    "exact",
+    "figures_report",
+    "plan_summary",
+    "refinement_line",
+]
 
 
-def exact(value: Fraction) -> str:
-    """``7/8 (0.875)``, ``1``; a fraction too long to read is given as a decimal marked ``≈``."""
-    if value.denominator == 1:
-        return str(value.numerator)
-    text = f"{value.numerator}/{value.denominator}" if value.denominator < 10**_LONGEST_FRACTION else ""
-    decimal = f"{float(value):.6g}"
-    mark = "" if Fraction(decimal) == value else "≈ "
-    return f"{text} ({mark}{decimal})" if text and len(text) <= _LONGEST_FRACTION else f"≈ {decimal}"
-
-
-def counted(number: int, noun: str) -> str:
-    """``1 file``, ``2 files``."""
-    return f"{number} {noun}{'s' * (number != 1)}"
+def changes(tree: Tree, before: bytes, after: bytes) -> str:
+    """``seen(soda) = true, …``: the variables that differ, with their new values."""
+    pairs = zip(tree.task.variables, before, after, strict=True)
+    changed = [f"{variable.name} = {Truth(new).word}" for variable, old, new in pairs if old != new]
+    return printable(", ".join(changed)) or "no change"
 
 
 def refinement_line(number: int, step: Refinement) -> list[str]:

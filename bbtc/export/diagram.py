@@ -17,15 +17,19 @@ from typing import Literal, TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.export.names import printable
-from bbtc.export.registry import Figures
+from bbtc.export.outline import UNICODE
+from bbtc.export.registry import Figures, Option
 from bbtc.ground.describe import describe
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 
 Kind: TypeAlias = Literal["control", "condition", "action", "expanded", "collapsed"]
 
-SYMBOLS: Mapping[ControlKind, str] = MappingProxyType(
-    {"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻"}
+SYMBOLS: Mapping[ControlKind, str] = UNICODE.symbols
+
+TEMPLATES = Option(
+    "templates", "expanded", "draw templates with their body, or as one node", ("expanded", "collapsed")
 )
+FLOW = Option("flow", False, "write the probability that a run reaches a node beside it")
 
 FILL: Mapping[Kind, str] = MappingProxyType(
     {

@@ -19,9 +19,11 @@ from pathlib import Path
 from bbtc.diagnostics import BbtcError
 from bbtc.export.diagram import (
     FILL,
+    FLOW,
     INK,
     PEN,
     SYMBOLS,
+    TEMPLATES,
     UNREACHED,
     Item,
     diagram,
@@ -44,11 +46,7 @@ _STAND_INS: dict[ControlKind, str] = {
 }  # the fonts inside graphviz-pure lack these arrows
 _PLAIN_ID = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 
-TEMPLATES = Option(
-    "templates", "expanded", "draw templates with their body, or as one node", ("expanded", "collapsed")
-)
 LEGEND = Option("legend", False, "add a legend of colours and symbols")
-FLOW = Option("flow", False, "write the probability that a run reaches a node at the line to it")
 
 
 @dataclass(frozen=True, slots=True)

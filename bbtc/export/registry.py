@@ -84,6 +84,10 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
         "btcpp": "bbtc.export.btcpp:btcpp",
         "btcpp_palette": "bbtc.export.btcpp_palette:btcpp_palette",
         "py_trees": "bbtc.export.pytrees:py_trees",
+        "mermaid": "bbtc.export.mermaid:mermaid",
+        "text": "bbtc.export.text:text",
+        "json": "bbtc.artefacts.formats:json_format",
+        "yaml": "bbtc.artefacts.formats:yaml_format",
         "py_trees_robot": "bbtc.export.pytrees_robot:py_trees_robot",
     }
 )

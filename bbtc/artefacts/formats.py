@@ -1,0 +1,64 @@
+"""Exporters ``json`` and ``yaml``: the tree artefact itself, for other programs.
+
+They stand here because artefacts come after the other exporters in the order of the stages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bbtc.artefacts.jsontext import dumps
+from bbtc.artefacts.tree_json import tree_to_json
+from bbtc.diagnostics import BbtcError
+from bbtc.export.registry import Figures, Option, OptionValue
+from bbtc.tree.nodes import Tree
+
+
+@dataclass(frozen=True, slots=True)
+class JsonExporter:
+    """What ``bbtc plan`` writes. Deterministic."""
+
+    name: str = "json"
+    description: str = "the tree artefact: what plan writes and simulate reads"
+    suffix: str = ".json"
+    options: tuple[Option, ...] = ()
+
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:  # noqa: ARG002
+        """The tree as canonical JSON."""
+        return dumps(tree_to_json(tree))
+
+
+@dataclass(frozen=True, slots=True)
+class YamlExporter:
+    """The fields of the JSON artefact, in its order, as YAML. Deterministic."""
+
+    name: str = "yaml"
+    description: str = "the tree artefact as YAML"
+    suffix: str = ".yaml"
+    options: tuple[Option, ...] = ()
+
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:  # noqa: ARG002
+        """The tree as YAML 1.1 that any safe loader reads. Raises :class:`BbtcError` for a tree that
+        is too deep for the YAML library."""
+        import yaml
+
+        class Dumper(yaml.SafeDumper):
+            """No anchors: what stands twice is written twice."""
+
+            def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002
+                return True
+
+        try:
+            text: str = yaml.dump(
+                tree_to_json(tree), Dumper=Dumper, allow_unicode=True, sort_keys=False, width=100
+            )
+        except RecursionError:
+            raise BbtcError.single(
+                "BBT0705", "the tree is too deep for YAML", hint="export to json"
+            ) from None
+        return text
+
+
+json_format = JsonExporter()
+yaml_format = YamlExporter()

@@ -1,0 +1,116 @@
+"""One run of a tree, a tick at a time, forwards and back."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from bbtc.belief.state import State, Transition, Values, compile_action, initial_belief
+from bbtc.belief.tick import STARTED, Status, compile_tick, memory_of
+from bbtc.ground.task import Task
+from bbtc.tree.nodes import ActionNode, Node, actions_of
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """What may come next: its probability, and the values of the variables then."""
+
+    probability: Fraction
+    values: Values
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A tick: the state it reads, the status every node it reached returned (by node id), and the
+    action node it started, None at the end of the run. ``branches`` are the possible outcomes of
+    that action, the most probable first; outcomes that differ only in cost are one."""
+
+    state: State
+    statuses: dict[str, Status]
+    status: Status
+    action: ActionNode | None
+    branches: tuple[Branch, ...]
+
+
+@dataclass(slots=True)
+class Stepper:
+    """A run that can be taken on, outcome by outcome, and back.
+
+    Drawn outcomes depend on the seed and on the number of the step alone, so that going back and on
+    again draws what was drawn before.
+    """
+
+    task: Task
+    root: Node
+    seed: int = 0
+    moments: list[Moment] = field(default_factory=list, init=False)
+    _transitions: dict[str, Transition] = field(default_factory=dict, init=False)
+
+    @property
+    def starts(self) -> tuple[Branch, ...]:
+        """The initial belief, the most probable first."""
+        return _branches(initial_belief(self.task))
+
+    @property
+    def now(self) -> Moment:
+        """The last tick made. Raises ``IndexError`` before :meth:`start`."""
+        return self.moments[-1]
+
+    @property
+    def finished(self) -> bool:
+        """Has the last tick started no action?"""
+        return self.now.action is None
+
+    def start(self, choice: int | None = None) -> None:
+        """Begin again: in the initial state number ``choice`` (from 0), or in a drawn one."""
+        starts = self.starts
+        values = starts[self._draw(starts, 0) if choice is None else choice].values
+        self.moments = [self._tick(State(values, 0))]
+
+    def step(self, choice: int | None = None) -> None:
+        """Take outcome number ``choice`` (from 0) of the running action, or a drawn one, and tick."""
+        moment = self.now
+        assert moment.action is not None
+        index = self._draw(moment.branches, len(self.moments)) if choice is None else choice
+        order = [node.id for node in actions_of(self.root)]
+        started = memory_of(self.root).started[order.index(moment.action.id)]
+        self.moments.append(self._tick(State(moment.branches[index].values, moment.state.finished + started)))
+
+    def back(self) -> bool:
+        """Take the last step back; False at the start."""
+        if len(self.moments) < 2:
+            return False
+        self.moments.pop()
+        return True
+
+    def _draw(self, branches: Sequence[Branch], step: int) -> int:
+        point = Fraction(random.Random(f"{self.seed}:{step}").getrandbits(64), 1 << 64)
+        for index, branch in enumerate(branches):
+            point -= branch.probability
+            if point < 0:
+                return index
+        return len(branches) - 1
+
+    def _tick(self, state: State) -> Moment:
+        statuses: dict[str, Status] = {}
+
+        def observe(node: Node, returned: int) -> None:
+            statuses[node.id] = Status.RUNNING if returned >= STARTED else Status(returned)
+
+        returned = compile_tick(self.task, self.root, observe)(state.values, state.finished)
+        if returned < STARTED:
+            return Moment(state, statuses, Status(returned), None, ())
+        action = list(actions_of(self.root))[returned - STARTED]
+        if action.action not in self._transitions:
+            self._transitions[action.action] = compile_action(self.task.action_by_name[action.action])
+        merged: dict[Values, Fraction] = {}
+        for result in self._transitions[action.action](state.values):
+            merged[result.values] = merged.get(result.values, Fraction(0)) + result.probability
+        return Moment(state, statuses, Status.RUNNING, action, _branches(merged))
+
+
+def _branches(belief: dict[Values, Fraction]) -> tuple[Branch, ...]:
+    ranked = sorted(belief.items(), key=lambda item: (-item[1], item[0]))
+    return tuple(Branch(probability, values) for values, probability in ranked)

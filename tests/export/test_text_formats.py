@@ -1,0 +1,178 @@
+"""The formats that are text for people and other programs: text, mermaid, json, yaml."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import pytest
+import yaml
+from hypothesis import given, settings
+
+from bbtc.artefacts import load_tree
+from bbtc.diagnostics import BbtcError
+from bbtc.export.diagram import diagram
+from bbtc.export.registry import load_exporter, parse_options
+from bbtc.ground.condition import Is
+from bbtc.kleene import Truth
+from bbtc.source import SourceFile
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+from tests.strategies import HOSTILE_NAMES, soda_tree, trees
+
+
+def export(
+    tree: Tree,
+    form: str,
+    options: Mapping[str, str] | None = None,
+    figures: Mapping[str, Fraction] | None = None,
+) -> str:
+    exporter = load_exporter(form)
+    written = exporter.export(tree, parse_options(exporter, options or {}), figures)
+    assert isinstance(written, str)
+    return written
+
+
+def depths(root: Node) -> list[int]:
+    """The depth of every node, in the order of :func:`walk`."""
+    children = root.children if isinstance(root, ControlNode) else ()
+    return [0, *(depth + 1 for child in children for depth in depths(child))]
+
+
+# --- text ------------------------------------------------------------------------------------
+
+
+def small() -> Tree:
+    """Light on, then detect: with a Skipper, and an action that may run again."""
+    tree = soda_tree()
+    dark, seen = ConditionNode("dark", Is(0, Truth.FALSE)), ConditionNode("seen", Is(1, Truth.TRUE))
+    look = ControlNode("look", "skipper", (seen, ActionNode("detect", "detect(soda)")))
+    light = ControlNode("light", "sequence", (dark, ActionNode("on", "light_on()", latched=False)))
+    return replace(tree, root=ControlNode("root", "fallback", (look, light)))
+
+
+def test_text_shows_a_tree_as_people_draw_it() -> None:
+    assert export(small(), "text") == (
+        "?\n"
+        "├─ ⇒\n"
+        "│  ├─ (seen(soda))\n"
+        "│  └─ [detect(soda)]\n"
+        "└─ →\n"
+        "   ├─ (not luminousity_ok())\n"
+        "   └─ [light_on()]+\n"
+    )
+
+
+def test_text_can_do_with_ascii_and_show_ids_and_probabilities() -> None:
+    figures = {node.id: Fraction(1, 3) for node in walk(small().root)}
+    shown = export(small(), "text", {"style": "ascii", "ids": "true"}, figures).splitlines()
+    assert shown[:2] == ["?  1/3  #root", "|- =>  1/3  #look"]
+    assert shown[-1] == "   `- [light_on()]+  1/3  #on"
+
+
+@given(trees(HOSTILE_NAMES))
+def test_text_has_one_indented_line_for_each_node_whatever_the_names(tree: Tree) -> None:
+    for style in ("unicode", "ascii"):
+        text = export(tree, "text", {"style": style})
+        lines = text.split("\n")
+        assert lines.pop() == ""
+        indents = [re.match(r"(?:[├└│ |`][─ -] )*", line) for line in lines]
+        assert [line for line in lines if not line.isprintable()] == []
+        found = [len(indent.group()) // 3 for indent in indents if indent is not None]
+        # A label may itself begin like a stroke, never a stroke like a label.
+        assert all(seen >= depth for seen, depth in zip(found, depths(tree.root), strict=True))
+        assert style == "unicode" or text.isascii()
+
+
+# --- mermaid ---------------------------------------------------------------------------------
+
+
+@dataclass
+class Chart:
+    """A Mermaid flowchart as its grammar reads it: only the few forms we write."""
+
+    texts: dict[str, list[str]]
+    classes: dict[str, str]
+    edges: list[tuple[str, str]]
+    labels: list[str]
+
+
+def read_mermaid(text: str) -> Chart:
+    """The chart; fails for any line that is not of a known form."""
+    chart = Chart({}, {}, [], [])
+    first, *lines = text.splitlines()
+    assert first == "flowchart TD"
+    for line in lines:
+        node = re.fullmatch(r'  (n\d+)(?:\[|\(\[)"([^"]*)"(?:\]|\]\)):::(\w+)', line)
+        edge = re.fullmatch(r'  (n\d+) -(?:-|\.-)>(?:\|"([^"]*)"\|)? (n\d+)', line)
+        if node:
+            chart.texts[node[1]] = [unescaped(part) for part in node[2].split("<br>")]
+            chart.classes[node[1]] = node[3]
+        elif edge:
+            chart.edges.append((edge[1], edge[3]))
+            chart.labels.append(unescaped(edge[2] or ""))
+        else:
+            assert re.fullmatch(r"  (classDef \w+|style n\d+|linkStyle [\d,]+) [#\w:,\- ]+", line), line
+    return chart
+
+
+def unescaped(text: str) -> str:
+    """Mermaid's character codes as characters; everything else must be harmless."""
+    assert not set(re.sub(r"#\d+;", "", text)) & set('<>&"`#[]{}|\\;\n%@$~^')
+    return re.sub(r"#(\d+);", lambda code: chr(int(code[1])), text)
+
+
+def test_mermaid_draws_the_colours_and_shapes_of_the_other_pictures() -> None:
+    chart = read_mermaid(export(small(), "mermaid"))
+    texts = ["?", "⇒", "seen(soda)", "detect(soda)", "→", "not luminousity_ok()", "light_on()"]
+    assert chart.texts == {f"n{number}": [text] for number, text in enumerate(texts)}
+    assert chart.edges == [("n0", "n1"), ("n1", "n2"), ("n1", "n3"), ("n0", "n4"), ("n4", "n5"), ("n4", "n6")]
+    assert [chart.classes[f"n{i}"] for i in range(4)] == ["control", "control", "condition", "action"]
+    assert "style n6 stroke-dasharray" in export(small(), "mermaid")  # may run again
+
+
+@given(trees(HOSTILE_NAMES))
+def test_mermaid_keeps_every_node_and_injects_nothing(tree: Tree) -> None:
+    chart = read_mermaid(export(tree, "mermaid"))
+    items = diagram(tree, None, expand=True)
+    assert len(chart.texts) == len(items)
+    for number, item in enumerate(items):
+        expected = item.lines if item.symbol is None else (item.symbol, *item.lines)
+        assert chart.texts[f"n{number}"] == list(expected)
+        if item.parent is not None:
+            assert (f"n{item.parent}", f"n{number}") in chart.edges
+
+
+def test_mermaid_marks_what_no_run_reaches() -> None:
+    nodes = list(walk(small().root))
+    figures = {node.id: Fraction(1) for node in nodes[:-1]}
+    text = export(small(), "mermaid", {"flow": "true"}, figures)
+    assert read_mermaid(text).labels == ["1", "1", "1", "1", "1", "0"]
+    assert "linkStyle 5 stroke" in text
+
+
+def test_mermaid_can_stand_in_a_code_block() -> None:
+    fenced = export(small(), "mermaid", {"fenced": "true"})
+    assert fenced == f"```mermaid\n{export(small(), 'mermaid')}```\n"
+
+
+# --- json and yaml ---------------------------------------------------------------------------
+
+
+@settings(max_examples=60)
+@given(trees(HOSTILE_NAMES))
+def test_json_is_the_artefact_and_yaml_holds_the_same(tree: Tree) -> None:
+    text = export(tree, "json")
+    assert export(load_tree(SourceFile("tree.json", text)), "json") == text
+    assert yaml.safe_load(export(tree, "yaml")) == json.loads(text)
+
+
+def test_yaml_refuses_what_is_too_deep_for_its_library() -> None:
+    tree = small()
+    root = tree.root
+    for level in range(2000):
+        root = ControlNode(f"deep{level}", "sequence", (root,))
+    with pytest.raises(BbtcError, match="BBT0705"):
+        export(replace(tree, root=root), "yaml")
