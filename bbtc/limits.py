@@ -1,11 +1,27 @@
-"""Bounds on time and size that every long computation honours."""
+"""Bounds on time, memory and size that every long computation honours, and how it tells where it is."""
 
 from __future__ import annotations
 
+import sys
 import time
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 from bbtc.diagnostics import Diagnostic, LimitReached
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """What a long computation is doing: the number of states seen so far, and what is known of the
+    best success probability, where it has that."""
+
+    doing: str
+    states: int | None = None
+    bounds: tuple[float, float] | None = None
+
+
+Watcher: TypeAlias = Callable[[Stage], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,9 +32,12 @@ class Limits:
     of one simulation, ``nodes`` the nodes of a tree. Of reading, ``file_bytes`` bounds the size of
     a file, and ``depth`` how deep its parentheses are nested. Of grounding, ``actions`` bounds the ground
     actions and templates, ``facts`` everything that the reachability analysis derives,
-    ``bindings`` the objects that quantifiers are tried with,
-    ``memory`` the bytes its engine may take, ``initial_states`` what a draw in ``:init`` is spelled
-    out into.
+    ``bindings`` the objects that quantifiers are tried with, ``initial_states`` what a draw in
+    ``:init`` is spelled out into. ``memory`` bounds the bytes that this process may take (its resident
+    set), and those of the engine that grounding runs beside it.
+
+    ``watcher`` is told what is being done whenever time is looked at. ``until`` is the moment (of
+    ``time.monotonic``) at which a part of the work has to end.
     """
 
     seconds: float | None = None
@@ -31,26 +50,50 @@ class Limits:
     initial_states: int = 256
     file_bytes: int = 64 << 20
     depth: int = 100
+    watcher: Watcher | None = field(default=None, compare=False, repr=False)
+    until: float | None = field(default=None, compare=False, repr=False)
     _start: float = field(default_factory=time.monotonic, compare=False, repr=False)
 
     @property
     def remaining(self) -> float | None:
         """Seconds left, not below 0; None without a bound."""
-        if self.seconds is None:
-            return None
-        return max(0.0, self._start + self.seconds - time.monotonic())
+        ends = [] if self.seconds is None else [self._start + self.seconds]
+        if self.until is not None:
+            ends.append(self.until)
+        return max(0.0, min(ends) - time.monotonic()) if ends else None
 
-    def check_time(self, doing: str) -> None:
-        """Raise :class:`LimitReached` once the time is over."""
-        if self.seconds is not None and time.monotonic() - self._start > self.seconds:
-            raise self.reached(f"the time limit of {self.seconds:g} s ended {doing}", "--time-limit")
+    def part(self, share: float) -> Limits:
+        """The same limits for a part of the work that may take a share of the time left."""
+        remaining = self.remaining
+        return self if remaining is None else replace(self, until=time.monotonic() + share * remaining)
+
+    def check_time(self, doing: str, states: int | None = None) -> None:
+        """Raise :class:`LimitReached` once the time is over or the memory is used up, and tell the
+        watcher what is being done."""
+        if self.watcher is not None:
+            self.watcher(Stage(doing, states))
+        if self.remaining == 0:
+            seconds = "" if self.seconds is None else f" of {self.seconds:g} s"
+            raise self.reached(f"the time limit{seconds} ended {doing}", "--time-limit")
+        self.check_memory(doing)
+
+    def check_memory(self, doing: str, more: int = 0) -> None:
+        """Raise :class:`LimitReached` if this process takes too much memory, or would with so many
+        bytes more. Where the system does not tell what it takes, nothing is raised."""
+        if self.memory is None:
+            return
+        taken = resident_memory()
+        if taken is not None and taken + more > self.memory:
+            raise self.reached(
+                f"the limit of {self.memory >> 20} MiB of memory ended {doing}", "--max-memory"
+            )
 
     def check_states(self, count: int, doing: str) -> None:
-        """Raise :class:`LimitReached` if ``count`` states are too many, or the time is over."""
+        """Raise :class:`LimitReached` if ``count`` states are too many, or time or memory is used up."""
         if count > self.states:
             raise self.reached(f"the limit of {self.states} states ended {doing}", "--max-states")
         if count % 256 == 0:
-            self.check_time(doing)
+            self.check_time(doing, count)
 
     def check_nodes(self, count: int) -> None:
         """Raise :class:`LimitReached` if a tree of ``count`` nodes is too large."""
@@ -76,3 +119,23 @@ class Limits:
     def reached(message: str, option: str) -> LimitReached:
         """The exception for a limit that ``option`` raises."""
         return LimitReached([Diagnostic("BBT0007", message, hint=f"raise it with {option}")])
+
+
+def resident_memory() -> int | None:
+    """The bytes of this process in memory; None where the system does not tell. Without ``/proc`` it is
+    the most that they ever were."""
+    try:
+        with open("/proc/self/statm", "rb") as file:  # noqa: PTH123 (called often)
+            pages = int(file.read().split()[1])
+    except OSError:
+        pass
+    else:
+        import resource
+
+        return pages * resource.getpagesize()
+    try:
+        import resource
+    except ImportError:  # Windows
+        return None
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else most << 10

@@ -37,7 +37,8 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
     if value.cost is not None:
         mark = "" if value.cost_exact else "about "
         lines.append(f"least expected cost of reaching it so often: {mark}{exact(value.cost)}")
-    lines.append(f"{counted(value.states, 'state')}, {counted(value.choices, 'choice')}")
+    some = "" if value.expanded == value.states else f" found, {value.expanded} expanded"
+    lines.append(f"{counted(value.states, 'state')}{some}, {counted(value.choices, 'choice')}")
     if value.stop is not None:
         lines.append(value.stop.message)
     return "".join(f"{line}\n" for line in lines)
@@ -67,6 +68,7 @@ def bounds_json(value: TaskValue, target: Fraction) -> str:
         "max_actions": value.max_actions,
         "cost": None if value.cost is None or not value.cost_exact else figure_text(value.cost),
         "states": value.states,
+        "expanded": value.expanded,
         "choices": value.choices,
         "stop": None if value.stop is None else value.stop.message,
     }

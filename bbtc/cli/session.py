@@ -119,7 +119,7 @@ _GROUNDING = (
     ("--max-ground-actions", "actions", 1, None, 1, "Ground actions and templates."),
     ("--max-facts", "facts", 1, None, 1, "Facts derived in grounding."),
     ("--max-bindings", "bindings", 1, None, 1, "Objects that quantifiers are tried with."),
-    ("--max-memory", "memory", 1, None, _MIB, "MiB of memory for grounding."),
+    ("--max-memory", "memory", 1, None, _MIB, "MiB of memory."),
 )
 _RUNNING = (
     ("--max-states", "states", 1, None, 1, "States of a simulation."),

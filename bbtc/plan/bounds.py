@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
@@ -11,17 +12,25 @@ from bbtc.limits import Limits
 from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.result import Plan
 
+if TYPE_CHECKING:
+    from bbtc.plan.space import StateSpace
+    from bbtc.plan.value import Bounds
+
+_EXPLORING = 1 / 2  # of the time, where values come after
+
 
 @dataclass(frozen=True, slots=True)
 class TaskValue:
     """P* lies between ``lower`` and ``upper`` (equal: it is known exactly); with ``max_actions``,
     the best probability with at most so many actions. ``cost`` is the least expected cost of a
-    policy that attains P*, exact if ``cost_exact``; None where it was not computed. ``stop`` says
-    which limit left the bounds apart, if one did."""
+    policy that attains P*, exact if ``cost_exact``; None where it was not computed. Of ``states``
+    found, ``expanded`` had their ``choices`` looked at: all of them, or those that matter. ``stop``
+    says which limit left the bounds apart, if one did."""
 
     lower: Fraction
     upper: Fraction
     states: int
+    expanded: int
     choices: int
     max_actions: int | None = None
     cost: Fraction | None = None
@@ -29,40 +38,74 @@ class TaskValue:
     stop: Diagnostic | None = None
 
 
-def task_value(task: Task, limits: Limits, options: Options = DEFAULTS, *, costs: bool = False) -> TaskValue:
-    """The value of a task; ``costs`` asks for the least cost, too. Limits make the bounds wider; only
-    time that is over before anything was found raises ``LimitReached``."""
-    from bbtc.plan.space import explore_space
-    from bbtc.plan.value import Bounds, best_probability, reachability
+def task_value(
+    task: Task,
+    limits: Limits,
+    options: Options = DEFAULTS,
+    *,
+    costs: bool = False,
+    target: Fraction | None = None,
+) -> TaskValue:
+    """The value of a task; ``costs`` asks for the least cost, too, which is found where the whole space
+    is small enough. With a ``target``, the bounds may stay apart where they tell whether it can be
+    reached. Limits make the bounds wider; only time that is over before anything was found raises
+    ``LimitReached``."""
+    from bbtc.plan.value_best import best_known
     from bbtc.plan.value_cost import least_cost
+
+    if options.max_actions is not None:
+        return _within(task, limits, options.max_actions)
+    best = best_known(task, limits, target)
+    cost, stop = None, best.stop
+    if costs and best.space.complete:
+        try:
+            cost = least_cost(best.found, limits)
+        except LimitReached as reached:
+            stop = reached.diagnostics[0]
+    return _value(
+        best.space,
+        best.bounds,
+        cost=None if cost is None else cost.initial,
+        cost_exact=cost is not None and cost.exact,
+        stop=stop,
+    )
+
+
+def _within(task: Task, limits: Limits, max_actions: int) -> TaskValue:
+    from bbtc.plan.space import explore_space
+    from bbtc.plan.value import Bounds
     from bbtc.plan.value_horizon import horizon_values
 
-    space = explore_space(task, limits, options.max_actions)
-    cost = None
-    stop = space.stop
-    if options.max_actions is not None and space.stop is None:
-        try:
-            bounds = horizon_values(space, options.max_actions, limits).initial[-1]
-        except LimitReached as reached:
-            bounds, stop = Bounds(Fraction(0), Fraction(1)), reached.diagnostics[0]
-    elif options.max_actions is None and space.complete:
-        found = reachability(space, limits)
-        bounds = found.initial
-        if costs:
-            try:
-                cost = least_cost(found, limits)
-            except LimitReached as reached:
-                stop = reached.diagnostics[0]
-    else:
-        bounds = best_probability(space, limits)
+    space = explore_space(task, limits.part(_EXPLORING), max_actions)
+    bounds, stop = Bounds(Fraction(0), Fraction(1)), space.stop
+    try:
+        bounds = horizon_values(space, max_actions, limits).initial[-1]
+        if stop is not None:
+            hope = horizon_values(space, max_actions, limits, space.goal | space.open).initial[-1]
+            bounds = Bounds(bounds.lower, hope.upper)
+    except LimitReached as reached:
+        bounds, stop = Bounds(bounds.lower, Fraction(1)), reached.diagnostics[0]
+    return _value(space, bounds, max_actions=max_actions, stop=stop)
+
+
+def _value(
+    space: StateSpace,
+    bounds: Bounds,
+    *,
+    max_actions: int | None = None,
+    cost: Fraction | None = None,
+    cost_exact: bool = False,
+    stop: Diagnostic | None,
+) -> TaskValue:
     return TaskValue(
         lower=bounds.lower,
         upper=bounds.upper,
         states=len(space.states),
+        expanded=space.expanded,
         choices=len(space.choice_action),
-        max_actions=options.max_actions,
-        cost=None if cost is None else cost.initial,
-        cost_exact=cost is not None and cost.exact,
+        max_actions=max_actions,
+        cost=cost,
+        cost_exact=cost_exact,
         stop=stop,
     )
 
@@ -75,7 +118,7 @@ def judged(plan: Plan, limits: Limits, options: Options = DEFAULTS) -> Plan:
         return plan
     lower, upper = tree.success_probability, Fraction(1)
     try:
-        value = task_value(tree.task, limits, options)
+        value = task_value(tree.task, limits, options, target=tree.target)
         lower, upper = max(lower, value.lower), value.upper
     except (LimitReached, MemoryError):
         pass

@@ -15,9 +15,10 @@ import numpy as np
 
 from bbtc.limits import Limits
 from bbtc.plan.policy_space import Offers, offers_of
+from bbtc.plan.space import ranges
 from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags
-from bbtc.plan.value_graph import Graph, ranges
+from bbtc.plan.value_graph import Graph
 from bbtc.plan.value_horizon import Horizon, best_choices, cheapest_choices
 
 

@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc.limits import Limits
-from bbtc.plan.space import StateSpace
+from bbtc.plan.space import StateSpace, ranges
 from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags
 from bbtc.plan.value import Reachability
 from bbtc.plan.value_cost import LeastCost, least_cost
-from bbtc.plan.value_graph import ranges
+from bbtc.plan.value_graph import Number
 
 MOST_OPEN = 20_000
 """More states than this, and one policy is fixed before a tree is made of it."""
@@ -74,7 +74,7 @@ def best_offers(found: Reachability, limits: Limits) -> tuple[Offers, LeastCost 
     return offers, cheapest
 
 
-def _fewest_actions(found: Reachability, limits: Limits) -> tuple[Index, Flags]:
+def _fewest_actions(found: Reachability, limits: Limits) -> tuple[Number, Flags]:
     shortest = least_cost(found, limits, [Fraction(1)] * len(found.space.draws))
     if shortest is not None and shortest.exact:
         return shortest.policy, shortest.best

@@ -17,12 +17,13 @@ from fractions import Fraction
 
 import numpy as np
 
+from bbtc.diagnostics import LimitReached
 from bbtc.limits import Limits
 from bbtc.plan.space import StateSpace
 from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags
 from bbtc.plan.value_exact import solve
-from bbtc.plan.value_graph import Floats, Graph, sums
+from bbtc.plan.value_graph import Floats, Graph, Number, sums
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _UNIT = 2.0**-53
@@ -63,7 +64,7 @@ class Reachability:
     upper: Floats
     exact: dict[int, Fraction] | None
     best: Flags
-    policy: Index
+    policy: Number
 
     def bounds(self, state: int) -> Bounds:
         """The value of one state."""
@@ -90,14 +91,22 @@ def draw_probabilities(space: StateSpace) -> Floats:
     return found
 
 
-def reachability(space: StateSpace, limits: Limits, goal: Flags | None = None) -> Reachability:
+def reachability(
+    space: StateSpace,
+    limits: Limits,
+    goal: Flags | None = None,
+    *,
+    graph: Graph | None = None,
+    rationals: bool = True,
+) -> Reachability:
     """P* of reaching ``goal`` (by default the task's) in the part of a space that was expanded.
 
-    Where the limit on time ends the iteration, the bounds are wider. Raises ``LimitReached`` only
-    if the time is over before the first step.
+    ``graph`` is the space's, if it was made before; without ``rationals`` the values of states that
+    numbers decide are left to floats. Where the limit on time ends the iteration, the bounds are wider.
+    Raises ``LimitReached`` only if the time is over before the first step.
     """
     limits.check_time("the search for the best probability")
-    graph = Graph(space)
+    graph = Graph(space) if graph is None else graph
     targets = space.goal if goal is None else goal
     reached = graph.reach(targets)
     some, surely = reached.found, graph.surely(targets, reached)
@@ -115,7 +124,7 @@ def reachability(space: StateSpace, limits: Limits, goal: Flags | None = None) -
         lower[part.states], upper[part.states] = low, high
         via = graph.reach(one, best).via
         policy[maybe] = via[maybe]
-        exact = part.exact_values(policy)
+        exact = part.exact_values(policy, limits) if rationals else None
         if exact is not None:
             values = np.array([float(exact[s]) for s in part.states.tolist()])
             best[part.choices] = part.exact_ties(exact, values)
@@ -203,26 +212,35 @@ class _Part:
                 win += p
         return win, row
 
-    def exact_values(self, policy: Index) -> dict[int, Fraction] | None:
+    def exact_values(self, policy: Number, limits: Limits) -> dict[int, Fraction] | None:
         """P* of every state by policy iteration in rationals, starting from a policy that reaches
         the goal from everywhere with positive probability; ``policy`` is improved in place. None
-        if that is too much work."""
+        if that is too much work, or the time is over."""
         if len(self.edge_target) > _MOST_EXACT or (policy[self.states] < 0).any():
             return None
-        while True:
-            rows = [self.row(int(choice)) for choice in policy[self.states]]
-            values = solve([row for _, row in rows], [win for win, _ in rows])
-            if values is None:
-                return None
-            if not self._improve(policy, values):
-                return dict(zip(self.states.tolist(), values, strict=True))
+        try:
+            while True:
+                rows = []
+                for count, choice in enumerate(policy[self.states].tolist()):
+                    if count % 1024 == 0:
+                        limits.check_time("the exact solution")
+                    rows.append(self.row(choice))
+                values = solve([row for _, row in rows], [win for win, _ in rows], limits)
+                if values is None:
+                    return None
+                if not self._improve(policy, values, limits):
+                    return dict(zip(self.states.tolist(), values, strict=True))
+        except LimitReached:
+            return None
 
-    def _improve(self, policy: Index, values: list[Fraction]) -> bool:
+    def _improve(self, policy: Number, values: list[Fraction], limits: Limits) -> bool:
         """Switch each state to its best choice where that is strictly better."""
         floats = np.array([float(value) for value in values])
         near = np.flatnonzero(self.choice_values(floats) > floats[self.choice_state] - _TIE)
         gain: dict[int, tuple[Fraction, int]] = {}
-        for local in near.tolist():
+        for count, local in enumerate(near.tolist()):
+            if count % 1024 == 0:
+                limits.check_time("the exact solution")
             choice, state = int(self.choices[local]), int(self.choice_state[local])
             if policy[self.states[state]] == choice:
                 continue
@@ -289,9 +307,7 @@ def best_probability(space: StateSpace, limits: Limits) -> Bounds:
     low = reachability(space, limits).initial
     if space.complete:
         return low
-    goal = space.goal.copy()
-    goal[space.expanded :] = True
-    return Bounds(low.lower, reachability(space, limits, goal).initial.upper)
+    return Bounds(low.lower, reachability(space, limits, space.goal | space.open).initial.upper)
 
 
 def _time_is_over(limits: Limits) -> bool:

@@ -14,11 +14,10 @@ from fractions import Fraction
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags
 from bbtc.plan.value import Reachability, draw_probabilities
 from bbtc.plan.value_exact import solve
-from bbtc.plan.value_graph import Floats, sums
+from bbtc.plan.value_graph import Floats, Number, sums
 
 _ZERO = Fraction(0)
 _MOST_EXACT = 100_000  # edges of a system that is solved in rationals
@@ -35,7 +34,7 @@ class LeastCost:
     initial: Fraction
     exact: bool
     values: Floats
-    policy: Index
+    policy: Number
     best: Flags
 
 
@@ -53,7 +52,7 @@ def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None
         return None
     open_states = ~found.zero & ~space.goal
     if not open_states.any():
-        empty = np.full(graph.states, -1, dtype=np.int64)
+        empty = np.full(graph.states, -1, dtype=np.int32)
         return LeastCost(_ZERO, True, np.zeros(graph.states), empty, np.zeros(graph.choices, dtype=np.bool_))
     system = _System(found, table, open_states)
     start = found.policy.copy()
@@ -91,7 +90,7 @@ class _System:
         found: Floats = self.cost + sums(self.graph.edge_choice, weights, self.graph.choices)
         return found
 
-    def improve_floats(self, policy: Index, limits: Limits) -> Floats:
+    def improve_floats(self, policy: Number, limits: Limits) -> Floats:
         """The optimal values in floats: those of a policy that ends, then value iteration from
         there downwards (from below, cycles without cost would hide the way out)."""
         values = np.zeros(self.graph.states)
@@ -123,7 +122,7 @@ class _System:
         near: Flags = self.allowed & (self.choice_values(values) <= limit + _TIE * np.maximum(1.0, limit))
         return near
 
-    def policy_from(self, values: Floats) -> Index:
+    def policy_from(self, values: Floats) -> Number:
         """A policy of such choices that ends: each state moves closer to an end."""
         via = self.graph.reach(~self.open, self.ties(values)).via
         return np.where(self.open & (via < 0), self.found.policy, np.where(self.open, via, -1))
@@ -143,14 +142,14 @@ class _System:
                 row[target] = row.get(target, _ZERO) + p
         return cost, row
 
-    def exact(self, policy: Index, limits: Limits) -> list[Fraction] | None:
+    def exact(self, policy: Number, limits: Limits) -> list[Fraction] | None:
         """The values in rationals; the policy is improved in place."""
         if int(self.allowed.sum()) > _MOST_EXACT:
             return None
         while True:
             limits.check_time("the search for the least cost")
             rows = [self.row(int(choice)) for choice in policy[self.states]]
-            values = solve([row for _, row in rows], [cost for cost, _ in rows])
+            values = solve([row for _, row in rows], [cost for cost, _ in rows], limits)
             if values is None:
                 return None
             floats = np.zeros(self.graph.states)

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from bbtc.belief.absorption import components
+from bbtc.limits import Limits
 
 Row: TypeAlias = dict[int, Fraction]
 """Probabilities by target; what is missing to 1 leaves the chain."""
@@ -15,14 +16,20 @@ _ZERO = Fraction(0)
 _MOST_WORK = 400_000  # elimination steps of one loop of states
 
 
-def solve(rows: Sequence[Mapping[int, Fraction]], constant: Sequence[Fraction]) -> list[Fraction] | None:
+def solve(
+    rows: Sequence[Mapping[int, Fraction]], constant: Sequence[Fraction], limits: Limits | None = None
+) -> list[Fraction] | None:
     """x with x = P x + c, exactly, for a chain that leaves every loop.
 
     Components are solved in topological order; within one, the state with the fewest links is
     eliminated first (minimum degree). None if a component is too large to be solved in rationals.
+    Raises ``LimitReached`` when the time is over.
     """
+    limits = limits or Limits()
     values: list[Fraction] = [_ZERO] * len(rows)
-    for component in components([tuple(row) for row in rows]):
+    for count, component in enumerate(components([tuple(row) for row in rows])):
+        if count % 256 == 0:
+            limits.check_time("the exact solution")
         if len(component) == 1:
             (state,) = component
             total, loop = constant[state], _ZERO
@@ -44,12 +51,14 @@ def solve(rows: Sequence[Mapping[int, Fraction]], constant: Sequence[Fraction]) 
                     open_rows[state][target] = p
                 else:
                     known[state] += p * values[target]
-        if not _eliminate(open_rows, known, values):
+        if not _eliminate(open_rows, known, values, limits):
             return None
     return values
 
 
-def _eliminate(rows: dict[int, Row], constant: dict[int, Fraction], values: list[Fraction]) -> bool:
+def _eliminate(
+    rows: dict[int, Row], constant: dict[int, Fraction], values: list[Fraction], limits: Limits
+) -> bool:
     users: dict[int, set[int]] = {state: set() for state in rows}
     for state, row in rows.items():
         for target in row:
@@ -66,6 +75,8 @@ def _eliminate(rows: dict[int, Row], constant: dict[int, Fraction], values: list
         buckets.setdefault(place[state], {})[state] = None
     left = len(rows)
     while left:
+        if left % 64 == 0:
+            limits.check_time("the exact solution")
         lowest = min(key for key, members in buckets.items() if members)
         pivot = next(iter(buckets[lowest]))
         del buckets[lowest][pivot]

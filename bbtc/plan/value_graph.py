@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc.belief.absorption import components
-from bbtc.plan.space import StateSpace
+from bbtc.plan.space import StateSpace, ranges
 from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags
 
@@ -56,13 +56,28 @@ class Graph:
         counts = np.bincount(space.edge_target, minlength=self.states)
         self._into_first: Index = np.concatenate(([0], np.cumsum(counts)))
 
-    def reach(self, targets: Flags, allowed: Flags | None = None) -> Reached:
-        """What may reach the targets by allowed choices (all by default)."""
-        depth = np.where(targets, 0, -1).astype(np.int32)
+    def reach(self, targets: Flags, allowed: Flags | None = None, ahead: Number | None = None) -> Reached:
+        """What may reach the targets by allowed choices (all by default). ``ahead`` tells how many
+        steps each target counts for itself; 0 by default."""
+        depth = np.full(self.states, -1, dtype=np.int32)
         via = np.full(self.states, -1, dtype=np.int32)
-        frontier: Index | Number = np.flatnonzero(targets)
+        waiting = np.flatnonzero(targets)
+        if ahead is not None:
+            waiting = waiting[np.argsort(ahead[waiting], kind="stable")]
+            due, first = np.unique(ahead[waiting], return_index=True)
+            levels = dict(zip(due.tolist(), np.split(waiting, first[1:]), strict=True))
+        else:
+            levels = {0: waiting}
+        frontier: Index | Number = np.empty(0, dtype=np.int64)
         step = 0
-        while len(frontier):
+        while len(frontier) or levels:
+            if not len(frontier):
+                step = min(levels)
+            if step in levels:
+                fresh = levels.pop(step)
+                fresh = fresh[depth[fresh] < 0]
+                depth[fresh] = step
+                frontier = np.concatenate([frontier, fresh])
             step += 1
             firsts = self._into_first[frontier]
             choices = self._into[ranges(firsts, self._into_first[frontier + 1] - firsts)]
@@ -133,11 +148,3 @@ class Graph:
 def sums(owners: Index | Number, weights: Floats, count: int) -> Floats:
     """For each of ``count`` owners, the sum of its weights."""
     return np.bincount(owners, weights=weights, minlength=count).astype(np.float64, copy=False)
-
-
-def ranges(firsts: Index, counts: Index) -> Index:
-    """The concatenation of ``range(first, first + count)`` over all pairs."""
-    ends = np.cumsum(counts)
-    total = int(ends[-1]) if len(ends) else 0
-    found: Index = np.arange(total) + np.repeat(firsts - (ends - counts), counts)
-    return found

@@ -29,19 +29,20 @@ class Horizon:
     exact: bool
 
 
-def horizon_values(space: StateSpace, steps: int, limits: Limits) -> Horizon:
-    """Values for 0, 1, … ``steps`` actions. The space must be expanded to that depth at least.
+def horizon_values(space: StateSpace, steps: int, limits: Limits, goal: Flags | None = None) -> Horizon:
+    """Values for 0, 1, … ``steps`` actions of reaching ``goal`` (by default the task's). They are those
+    of the task if the space is expanded to that depth at least.
 
     Raises ``LimitReached`` when the time is over.
     """
     if len(space.edge_target) * steps <= _MOST_EXACT:
-        return _exact(space, steps, limits)
+        return _exact(space, steps, limits, space.goal if goal is None else goal)
     graph = Graph(space)
     weight = draw_probabilities(space)
     degree = int(np.bincount(graph.edge_choice).max()) + 2
     live = np.unique(graph.choice_state)
     first = np.searchsorted(graph.choice_state, live)
-    values = space.goal.astype(np.float64)
+    values = (space.goal if goal is None else goal).astype(np.float64)
     found = [values]
     for _ in range(steps):
         limits.check_time("backward induction")
@@ -58,13 +59,13 @@ def horizon_values(space: StateSpace, steps: int, limits: Limits) -> Horizon:
     return Horizon(space, tuple(initial), tuple(found), exact=False)
 
 
-def _exact(space: StateSpace, steps: int, limits: Limits) -> Horizon:
+def _exact(space: StateSpace, steps: int, limits: Limits, aims: Flags) -> Horizon:
     table = [draw.probability for draw in space.draws]
     targets = space.edge_target.tolist()
     probabilities = [table[draw] for draw in space.edge_draw.tolist()]
     choices = space.choice_first.tolist()
     edges = space.edge_first.tolist()
-    values = [_ONE if goal else _ZERO for goal in space.goal.tolist()]
+    values = [_ONE if goal else _ZERO for goal in aims.tolist()]
     found = [values]
     for _ in range(steps):
         limits.check_time("backward induction")

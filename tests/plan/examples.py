@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
+
 from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -61,3 +63,11 @@ def corpus_optima() -> list[Optimum]:
         budgets = tuple(zip((2, 4, 8, 16), map(float, within.split(",")), strict=True))
         found.append(Optimum((folder / domain, folder / problem), float(best), budgets))
     return found
+
+
+def public(folder: str, problem: str) -> Optimum:
+    """A public problem by name, without its optimum; skips the test where the corpus is absent."""
+    corpus = corpus_folder()
+    if corpus is None:
+        pytest.skip("no corpus: set BBTC_CORPUS, or put it at ../shared/corpus")
+    return Optimum((corpus / folder / "domain.pddl", corpus / folder / f"{problem}.pddl"), -1, ())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,12 +33,28 @@ ONESHOT = """
 """
 
 
+def coins(count: int) -> str:
+    """A text with coins to toss, each once; the goal takes heads three times out of four for each."""
+    names = range(count)
+    tosses = " ".join(
+        f"(:action toss{i} :precondition (not (tossed{i}))"
+        f" :effect (and (tossed{i}) (probabilistic 3/4 (heads{i}))))"
+        for i in names
+    )
+    facts = " ".join(f"(tossed{i}) (heads{i})" for i in names)
+    goal = " ".join(f"(heads{i})" for i in names)
+    return (
+        f"(define (domain coins) (:predicates {facts}) {tosses})"
+        f"(define (problem all) (:domain coins) (:init) (:goal (and {goal})))"
+    )
+
+
 def one_shot() -> Task:
     once = action("try", Is(1, T), ("0.5", {0: T, 1: F}), ("0.5", {1: F}))
     return task("goal available", {1: T}, Is(0, T), once)
 
 
-def plan(of: Task, target: str, **limits: int) -> Plan:
+def plan(of: Task, target: str, **limits: Any) -> Plan:
     return plan_task(of, Fraction(target), "refine", Limits(**limits), lambda _: None)
 
 
@@ -67,8 +84,8 @@ def test_bounds_stay_apart_at_a_limit() -> None:
     assert value.stop is not None
     assert (value.lower, value.upper) == (0, 1)
     value = task_value(of, Limits(states=9))
-    assert value.stop is not None
     assert (value.lower, value.upper) == (1, 1), "found in the part that was seen"
+    assert value.expanded < value.states
 
 
 def test_a_plan_at_a_limit_has_bounds() -> None:
@@ -112,7 +129,19 @@ def test_bounds_alone(oneshot: str) -> None:
     assert "best success probability: 1/2 (0.5)" in done.out.decode()
     assert "target 9/10 (0.9): out of reach" in done.out.decode()
     assert bbtc("plan", oneshot, "--bounds", "--target", "1/2").status == 0
-    assert bbtc("plan", oneshot, "--bounds", "--max-states", "1").status == 3
+
+
+def test_bounds_at_a_limit(tmp_path: Path) -> None:
+    """Ten coins to toss, each once: the goal is far away, and no state of the way is lost."""
+    file = tmp_path / "coins.pddl"
+    file.write_text(coins(10))
+    done = bbtc("plan", str(file), "--bounds", "--max-states", "5", "--target", "1/2")
+    assert done.status == 3
+    lines = done.out.decode().splitlines()
+    assert lines[1] == "best success probability: between 0 and ≈ 0.75"
+    assert lines[2] == "target 1/2 (0.5): undecided"
+    assert lines[-1] == "the limit of 5 states ended exploration"
+    assert "expanded" in lines[-2]
 
 
 def test_bounds_as_json(oneshot: str) -> None:

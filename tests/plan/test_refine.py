@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -40,7 +41,7 @@ def task(names: str, start: dict[int, Truth], goal: Condition, *actions: GroundA
     return Task("test", "test", variables, (InitialState(Fraction(1), values),), goal, ordered)
 
 
-def plan(of: Task, target: str, **limits: int) -> Plan:
+def plan(of: Task, target: str, **limits: Any) -> Plan:
     return refine(of, Fraction(target), Limits(**limits), lambda _: None)
 
 

@@ -16,6 +16,7 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.plan import value as value_module
+from bbtc.plan.heuristic_search import search_bounds
 from bbtc.plan.space import explore_space
 from bbtc.plan.value import Reachability, best_probability, reachability
 from bbtc.plan.value_cost import least_cost
@@ -55,12 +56,17 @@ def test_public_problems_have_their_listed_values(problem: Optimum) -> None:
         of = problem.task()
     except BbtcError as error:
         pytest.skip(f"does not load: {error.diagnostics[0].message}")
-    start = time.monotonic()
+    start = time.process_time()
     space = explore_space(of, Limits())
     bounds = reachability(space, Limits()).initial
-    assert time.monotonic() - start < 10
+    assert time.process_time() - start < 10
     assert float(bounds.lower) == pytest.approx(problem.best, abs=1e-6)
     assert float(bounds.upper) == pytest.approx(problem.best, abs=1e-6)
+    start = time.process_time()
+    searched = search_bounds(of, Limits()).bounds
+    assert time.process_time() - start < 10
+    assert float(searched.lower) == pytest.approx(problem.best, abs=1e-6)
+    assert float(searched.upper) == pytest.approx(problem.best, abs=1e-6)
     within = horizon_values(space, 16, Limits())
     for budget, expected in problem.within:
         assert float(within.initial[budget].lower) == pytest.approx(expected, abs=1.01e-6)

@@ -1,0 +1,133 @@
+"""The search that expands only what matters: its bounds hold the exact value, and meet."""
+
+from __future__ import annotations
+
+import os
+from fractions import Fraction
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from bbtc.ground.condition import Is
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.plan import heuristic_search
+from bbtc.plan.heuristic import Heuristic
+from bbtc.plan.heuristic_search import search_bounds
+from bbtc.plan.space import explore_space
+from bbtc.plan.value import reachability
+from bbtc.plan.value_best import best_known
+from tests.plan.examples import Optimum, cases, public
+from tests.plan.test_refine import action, task
+from tests.strategies import tasks
+
+T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
+MANY = 5000 if os.environ.get("BBTC_LONG") else 100
+"""Random tasks of one kind."""
+
+
+@pytest.fixture
+def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step of the search expands few states, so that parts of small spaces remain open."""
+    monkeypatch.setattr(heuristic_search, "_SMALLEST", 2)
+
+
+@pytest.mark.usefixtures("small_steps")
+@settings(
+    max_examples=MANY,
+    suppress_health_check=[*HealthCheck],
+)
+@given(of=tasks(nested=2, most_actions=6))
+def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> None:
+    known = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    assert known is not None
+    found = search_bounds(of, Limits())
+    assert found.stop is None
+    assert found.bounds.lower <= known <= found.bounds.upper
+    assert found.bounds.upper - found.bounds.lower <= 1e-9
+    assert found.lower.initial.lower == found.bounds.lower, "the policy attains the lower bound"
+
+
+@pytest.mark.usefixtures("small_steps")
+@settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
+@given(of=tasks(nested=2, most_actions=6))
+def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
+    known = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    assert known is not None
+    for states in (1, 3, 6):
+        found = search_bounds(of, Limits(states=states))
+        assert found.bounds.lower <= known <= found.bounds.upper
+    target = Fraction(1, 2)
+    told = search_bounds(of, Limits(), target).bounds
+    assert told.lower <= known <= told.upper
+    assert (told.lower >= target) == (known >= target) or told.upper - told.lower < 1e-9
+
+
+@settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
+@given(of=tasks(nested=2, most_actions=6))
+def test_what_the_heuristic_calls_a_dead_end_is_one(of: Task) -> None:
+    space = explore_space(of, Limits())
+    guess = Heuristic(of, space.packing).estimate(space.states)
+    hopeless = reachability(space, Limits()).zero
+    assert not (guess == float("inf"))[~hopeless].any()
+    assert ((guess == 0) | ~space.goal).all()
+
+
+def test_a_loop_that_can_be_left_only_with_a_loss_is_not_worth_more_than_its_exit(small_steps: None) -> None:
+    """Two rooms one can go round in for ever: an end component, in which optimism would stay."""
+    there, back = action("there", Is(0, F), ("1", {0: T})), action("back", Is(0, T), ("1", {0: F}))
+    risk = action("risk", Is(2, F), ("1/3", {1: T, 2: T}), ("2/3", {2: T}))
+    of = task("room won over", {}, Is(1, T), there, back, risk)
+    assert search_bounds(of, Limits()).bounds.exact == Fraction(1, 3)
+
+
+def test_a_goal_that_nothing_reaches_takes_no_expansion() -> None:
+    found = search_bounds(task("a b", {}, Is(0, T), action("b", Is(1, F), ("1", {1: T}))), Limits())
+    assert found.bounds.exact == 0
+    assert found.space.expanded == 1
+    assert len(found.space.states) == 1
+
+
+@pytest.mark.parametrize("case", cases(), ids=lambda c: c.name)
+def test_cases_have_their_listed_values(case: Optimum) -> None:
+    bounds = search_bounds(case.task(), Limits()).bounds
+    assert float(bounds.lower) == pytest.approx(case.best, abs=1e-9)
+    assert float(bounds.upper) == pytest.approx(case.best, abs=1e-9)
+
+
+TRIANGLE = "ppddl/probfd-triangle-tireworld-ippc08"
+BLOCKS = "ppddl/probfd-exploding-blocksworld-ippc08-fixed"
+
+
+@pytest.mark.parametrize(
+    ("folder", "problem", "best", "most"),
+    [
+        (TRIANGLE, "p04", 1, 5_000),  # of 843,098 states
+        (TRIANGLE, "p05", 1, 10_000),  # of some millions
+        (BLOCKS, "p02-n3-N5-s2", 0.36, 2_000),  # of 86,445
+    ],
+)
+def test_little_of_a_large_space_is_expanded(folder: str, problem: str, best: float, most: int) -> None:
+    found = search_bounds(public(folder, problem).task(), Limits())
+    assert float(found.bounds.lower) == pytest.approx(best, abs=1e-9)
+    assert float(found.bounds.upper) == pytest.approx(best, abs=1e-9)
+    assert found.space.expanded < most
+
+
+def test_a_space_above_the_limit_is_searched() -> None:
+    of = public(TRIANGLE, "p05").task()
+    best = best_known(of, Limits(states=50_000))
+    assert best.stop is None
+    assert best.bounds.exact == 1
+    assert len(best.space.states) < 50_000
+
+
+def test_a_search_that_meets_a_limit_still_bounds_the_value() -> None:
+    of = public(BLOCKS, "p02-n3-N5-s2").task()
+    found = search_bounds(of, Limits(states=300))
+    assert found.stop is not None
+    assert "300 states" in found.stop.message
+    assert 0 <= found.bounds.lower <= Fraction(36, 100) <= found.bounds.upper <= 1
+    assert found.bounds.lower > 0 or found.bounds.upper < 1, "it tells something"
+    assert len(found.space.states) < 330
