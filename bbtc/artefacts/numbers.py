@@ -15,6 +15,7 @@ MAX_LENGTH = 100_000
 """Characters a number may have in an artefact, so that reading one cannot take minutes."""
 
 _MAX_DECIMALS = 18
+_LONGEST_SHOWN = 25
 _LONGEST_WRITTEN = 1000  # characters; a probability with more is a mistake or an attack
 _LONG_EXPONENT = re.compile(r"[eE][-+]?[0-9_]{4}")  # 10 to such powers takes for ever to compute
 _CHUNK = 1000  # digits converted at a time: Python refuses to convert more than 4300 at once
@@ -55,18 +56,34 @@ def parse_number(text: str) -> Fraction:
     return -value if sign else value
 
 
+def exact(value: Fraction) -> str:
+    """A number for people: ``7/8 (0.875)``, ``1``; a fraction too long to read is given as a decimal
+    marked ``≈``."""
+    if value.denominator == 1:
+        return str(value.numerator)
+    text = f"{value.numerator}/{value.denominator}" if value.denominator < 10**_LONGEST_SHOWN else ""
+    decimal = f"{float(value):.6g}"
+    mark = "" if Fraction(decimal) == value else "≈ "
+    return f"{text} ({mark}{decimal})" if text and len(text) <= _LONGEST_SHOWN else f"≈ {decimal}"
+
+
 def parse_probability(text: str) -> Fraction:
     """The value of an exact probability as people write it: ``0.9``, ``9/10``, ``90%``, ``1e-3``.
     Raises ``ValueError`` for any other text and for a value outside [0, 1]."""
-    costly = len(text) > _LONGEST_WRITTEN or _LONG_EXPONENT.search(text)
-    written = "" if costly else text
-    try:
-        number = Fraction(written[:-1]) / 100 if written.endswith("%") else Fraction(written)
-    except (ValueError, ZeroDivisionError):
-        raise ValueError(f"'{text[:40]}' is not a probability such as 0.9, 9/10 or 90%") from None
+    number = parse_written(text, "a probability such as 0.9, 9/10 or 90%")
     if not 0 <= number <= 1:
         raise ValueError(f"{text[:40]} is not between 0 and 1")
     return number
+
+
+def parse_written(text: str, expected: str = "a number such as 0.9, 9/10 or 90%") -> Fraction:
+    """The value of a number as people write it. Raises ``ValueError`` for any other text."""
+    costly = len(text) > _LONGEST_WRITTEN or _LONG_EXPONENT.search(text)
+    written = "" if costly else text
+    try:
+        return Fraction(written[:-1]) / 100 if written.endswith("%") else Fraction(written)
+    except (ValueError, ZeroDivisionError):
+        raise ValueError(f"'{text[:40]}' is not {expected}") from None
 
 
 def _decimals(denominator: int) -> int:
