@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -125,3 +129,13 @@ def test_two_edits_are_within_two_steps(one: str, other: str) -> None:
 def test_the_nearest_of_several_is_offered() -> None:
     assert slip("luminosity", ["luminousity", "luminosty_x", "lumin"]) == "luminousity"
     assert slip("at", ["it"]) is None
+
+
+def test_a_strict_check_refuses_what_is_inferred(tmp_path: Path) -> None:
+    file = tmp_path / "house.pddl"
+    file.write_text(LACKING)
+    command = [sys.executable, "-m", "bbtc.cli.main", "check", str(file)]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+    strict = subprocess.run([*command, "--strict"], capture_output=True, text=True, check=False)
+    assert strict.returncode == 1
+    assert "warning[BBT0225]: type `door` is not declared" in strict.stderr

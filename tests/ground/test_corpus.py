@@ -47,7 +47,7 @@ def _optima() -> Iterator[tuple[str, str]]:
     for line in Path(CORPUS, "optima.tsv").read_text("utf-8").splitlines():
         domain, problem = line.split("\t")[:2] if not line.startswith("#") else ("", "")
         folder = problem.rpartition("/")[0]
-        if folder and seen.setdefault(folder, 0) < _PER_FOLDER and "prp-rectangle" not in folder:
+        if folder and seen.setdefault(folder, 0) < _PER_FOLDER:
             seen[folder] += 1
             yield domain, problem
 
