@@ -10,7 +10,7 @@ BBTC := .venv/demo/bin/bbtc
 PIP_INSTALL := -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format golden clean python-version
+.PHONY: help demo test lint format golden pictures clean python-version
 
 help:
 	@echo "make demo    from the household domain to trees that run, into $(OUT)/"
@@ -18,6 +18,7 @@ help:
 	@echo "make lint    ruff, mypy, import layers"
 	@echo "make format  lay out the Python code"
 	@echo "make golden  all tests, rewriting the golden files that drifted"
+	@echo "make pictures  draw the pictures of docs/pictures/ anew"
 	@echo "make clean   remove what these targets made"
 
 # --- what the README shows -------------------------------------------------------------------
@@ -53,6 +54,18 @@ format: .venv/dev/.installed
 
 golden: .venv/dev/.installed
 	.venv/dev/bin/python -m pytest $(PYTEST_ARGS) --update-golden
+
+PICTURE = $(BBTC) export $(OUT)/tree.json -o docs/pictures/household
+
+pictures: BBTC := .venv/dev/bin/bbtc
+pictures: .venv/dev/.installed
+	$(BBTC) plan $(DOMAIN) $(PROBLEM) --strategy refine -q -o $(OUT)/tree.json
+	$(PICTURE).svg --to svg -O layout=bbtc -O flow=true -O legend=true
+	$(PICTURE).png --to png -O layout=graphviz-pure -O flow=true
+	$(PICTURE)-collapsed.svg --to svg -O layout=graphviz-pure -O templates=collapsed
+	$(PICTURE).dot --to dot -O flow=true
+	$(PICTURE).mmd --to mermaid -O templates=collapsed -O flow=true
+	$(PICTURE).txt --to text -O flow=true
 
 clean:
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
