@@ -54,6 +54,10 @@ class Limits:
     until: float | None = field(default=None, compare=False, repr=False)
     _start: float = field(default_factory=time.monotonic, compare=False, repr=False)
 
+    def afresh(self) -> Limits:
+        """The same bounds, with the time counted from now."""
+        return replace(self, _start=time.monotonic())
+
     @property
     def remaining(self) -> float | None:
         """Seconds left, not below 0; None without a bound."""
@@ -67,11 +71,17 @@ class Limits:
         remaining = self.remaining
         return self if remaining is None else replace(self, until=time.monotonic() + share * remaining)
 
+    def tell(
+        self, doing: str, states: int | None = None, bounds: tuple[float, float] | None = None
+    ) -> None:
+        """Tell the watcher, if there is one, what is being done."""
+        if self.watcher is not None:
+            self.watcher(Stage(doing, states, bounds))
+
     def check_time(self, doing: str, states: int | None = None) -> None:
         """Raise :class:`LimitReached` once the time is over or the memory is used up, and tell the
         watcher what is being done."""
-        if self.watcher is not None:
-            self.watcher(Stage(doing, states))
+        self.tell(doing, states)
         if self.remaining == 0:
             seconds = "" if self.seconds is None else f" of {self.seconds:g} s"
             raise self.reached(f"the time limit{seconds} ended {doing}", "--time-limit")

@@ -33,6 +33,7 @@ def command(session: Session, old: str, new: str, form: str, exit_code: bool, ou
     trees = [tree_of(session.read(path)) for path in (old, new)]
     first, second = ((tree, simulate_tree(tree, session.limits)[0]) for tree in trees)
     comparison = compare(first, second)
+    session.clear()
     lines = markdown_report(comparison) if form == "markdown" else text_report(comparison)
     write(output, "".join(f"{line}\n" for line in lines))
     return int(exit_code and comparison.differs)

@@ -6,13 +6,14 @@ import functools
 import os
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, NoReturn, TypeAlias, cast
 
 import click
 
 from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT
+from bbtc.cli.output import ProgressLine
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.limits import Limits
@@ -27,10 +28,23 @@ class Session:
     limits: Limits
     report: Report = field(default_factory=Report)
     inputs: list[str] = field(default_factory=list)
+    line: ProgressLine | None = None
+
+    @classmethod
+    def begun(cls, form: str, limits: Limits) -> Session:
+        """A session that shows progress where people can see it."""
+        line = ProgressLine.on_terminal() if form == "text" else None
+        return cls(form, limits if line is None else replace(limits, watcher=line.watch), line=line)
+
+    def clear(self) -> None:
+        """Take away what is shown of the progress."""
+        if self.line is not None:
+            self.line.erase()
 
     def say(self, text: str = "") -> None:
         """A message for people, on stderr; silent where diagnostics are written for machines."""
         if self.form == "text":
+            self.clear()
             click.echo(text, err=True)
 
     def read(self, path: str) -> SourceFile:
@@ -45,6 +59,7 @@ class Session:
         color = self.form == "text" and sys.stderr.isatty() and "NO_COLOR" not in os.environ
         text = render(diagnostics, self.form, color=color)
         if text:
+            self.clear()
             click.echo(text, err=True, nl=False, color=color)
 
 
@@ -63,11 +78,13 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
     def run(ctx: click.Context, own_format: str | None, **arguments: Any) -> None:
         bounds = {key: arguments.pop(key) for key in list(arguments) if key.startswith("limit_")}
         limits = Limits(**{key.removeprefix("limit_"): value for key, value in bounds.items()})
-        session = Session(own_format or ctx.obj["format"], limits)
+        session = Session.begun(own_format or ctx.obj["format"], limits)
         try:
             status = function(session, **arguments)
         except BbtcError as error:
             _fail(session, error)
+        finally:
+            session.clear()
         session.show([*session.report])
         sys.exit(status or 0)
 

@@ -47,6 +47,7 @@ def command(
     loaded = tree_of(session.read(tree))
     limits = session.limits
     figures, chain = simulate_tree(loaded, limits)
+    session.clear()
     listed = list(itertools.islice(runs(chain), scenarios))
     sampled = sample(chain, samples, seed) if samples else None
     if as_json:

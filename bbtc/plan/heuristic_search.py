@@ -113,7 +113,12 @@ class _Search:
         lower = reachability(space, self.limits, graph=graph, rationals=False)
         hope = space.goal | space.open
         upper = reachability(space, self.limits, hope, graph=graph, rationals=False)
-        return _Solved(space, graph, lower, upper)
+        solved = _Solved(space, graph, lower, upper)
+        bounds = solved.bounds
+        self.limits.tell(
+            "search for the best probability", space.expanded, (float(bounds.lower), float(bounds.upper))
+        )
+        return solved
 
     def _solve_late(self, before: _Solved) -> _Solved:
         try:
