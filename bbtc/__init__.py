@@ -1,7 +1,7 @@
 """Compiler from probabilistic, three-valued planning domains to belief behavior trees.
 
-The functions of :mod:`bbtc.api` stand here, imported when they are used. Two of them, :func:`plan` and
-:func:`export`, share their names with subpackages: the modules are made callable.
+The functions of :mod:`bbtc.api` stand here, imported when they are used. Some of them, such as
+:func:`plan`, share their names with subpackages: those modules are made callable.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bbtc.api import (
         bounds,
+        build,
         check,
         compile,  # noqa: A004 - the name of the command
         dumps,
@@ -50,6 +51,7 @@ __all__ = [
     "Task",
     "Tree",
     "bounds",
+    "build",
     "check",
     "compile",
     "dumps",
@@ -80,7 +82,7 @@ _HOMES = MappingProxyType(
 )
 """The modules of what does not stand in ``api``."""
 
-_NAMESAKES = ("export", "plan")
+_NAMESAKES = ("build", "export", "plan")
 """Functions of ``api`` that are subpackages, too."""
 
 
@@ -102,12 +104,14 @@ class _Package(ModuleType):
         super().__setattr__(name, value)
 
 
-def __getattr__(name: str) -> object:
-    if name in _NAMESAKES:
-        return import_module(f"bbtc.{name}")
-    if name in __all__:
-        return getattr(import_module(f"bbtc.{_HOMES.get(name, 'api')}"), name)
-    raise AttributeError(f"module 'bbtc' has no attribute '{name}'")
+if not TYPE_CHECKING:  # a checker shall see only what is named above
+
+    def __getattr__(name: str) -> object:
+        if name in _NAMESAKES:
+            return import_module(f"bbtc.{name}")
+        if name in __all__:
+            return getattr(import_module(f"bbtc.{_HOMES.get(name, 'api')}"), name)
+        raise AttributeError(f"module 'bbtc' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:

@@ -21,6 +21,7 @@ from bbtc.source import SourceFile
 if TYPE_CHECKING:
     from bbtc.belief.scenarios import Scenario
     from bbtc.belief.simulate import Figures
+    from bbtc.build.runner import BuildReport
     from bbtc.export.registry import Artefact
     from bbtc.ground.task import Task
     from bbtc.model.domain import Model
@@ -191,6 +192,29 @@ def export(
         name: str(value).lower() if isinstance(value, bool) else str(value) for name, value in options.items()
     }
     return pipeline.export_tree(_tree(tree, limits), to, texts, limits or Limits())
+
+
+def build(
+    manifest: str | os.PathLike[str] | None = None,
+    *names: str,
+    jobs: int | None = None,
+    check: bool = False,
+    force: bool = False,
+) -> BuildReport:
+    """Build the trees of a project, or only those named, as far as they are out of date.
+
+    ``manifest`` is the file, default: that of the current folder or the nearest one around it; ``jobs``
+    are done at once. With ``check`` nothing is written, and a tree fails whose files differ from
+    what would be. What is wrong with one tree is part of its outcome; raises :class:`BbtcError`
+    for a manifest that is wrong.
+    """
+    from pathlib import Path
+
+    from bbtc.build.runner import build as run
+    from bbtc.manifest.find import find_manifest
+
+    file = find_manifest(Path()) if manifest is None else Path(manifest)
+    return run(file, names=names, jobs=jobs, check=check, force=force)
 
 
 def explain(code: str) -> str:

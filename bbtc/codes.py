@@ -2,7 +2,7 @@
 
 Ranges: 00xx files and limits, 01xx syntax, 02xx names and types, 03xx checks (warnings),
 04xx grounding, 05xx planning and trees, 06xx artefacts, 07xx exports,
-08xx verification.
+08xx verification, 10xx projects.
 """
 
 from __future__ import annotations
@@ -95,6 +95,10 @@ CODES: dict[str, str] = {
     "BBT0611": "control node without children",
     "BBT0612": "template calls itself",
     "BBT0613": "wrong number of attempts",
+    "BBT0614": "XML that is not well-formed, or has a document type",
+    "BBT0615": "not a BehaviorTree.CPP file",
+    "BBT0616": "node that a tree has no counterpart for",
+    "BBT0617": "notes that cannot be read",
     # 07xx: exports
     "BBT0701": "unknown export format",
     "BBT0702": "two exporters claim one format",
@@ -107,4 +111,12 @@ CODES: dict[str, str] = {
     "BBT0802": "tree that is not sound",
     "BBT0803": "Storm is not installed",
     "BBT0804": "Storm gave no answer",
+    # 10xx: projects
+    "BBT1001": "manifest is not valid YAML or TOML",
+    "BBT1002": "no manifest, or two",
+    "BBT1003": "two artefacts in one file",
+    "BBT1004": "target not reached in a build",
+    "BBT1005": "expected figure not met",
+    "BBT1006": "internal error in a build",
+    "BBT1007": "file in the way of a new project",
 }

@@ -13,12 +13,13 @@ from pathlib import Path
 from bbtc.diagnostics import BbtcError
 
 
-def write(path: str, content: str | bytes, *, check: bool = False) -> bool:
+def write(path: str, content: str | bytes, *, check: bool = False, scratch: str | None = None) -> bool:
     """Write an artefact to ``path`` (``-``: stdout); whether anything was written.
 
-    A file is written beside its place and renamed, and left untouched if it has the content
-    already. With ``check`` nothing is written, and a difference raises :class:`BbtcError` with a
-    diff. Raises :class:`BbtcError` if the file cannot be written.
+    A file is written beside its place, or in the folder ``scratch`` if that is on the same file system,
+    and renamed; it is left untouched if it has the content already. With ``check`` nothing is
+    written, and a difference raises :class:`BbtcError` with a diff. Raises :class:`BbtcError` if
+    the file cannot be written.
     """
     data = content.encode() if isinstance(content, str) else content
     if path == "-":
@@ -37,7 +38,7 @@ def write(path: str, content: str | bytes, *, check: bool = False) -> bool:
         return False
     if check:
         raise drift(path, old, data)
-    _replace(path, data)
+    _replace(path, data, scratch)
     return True
 
 
@@ -63,11 +64,14 @@ def drift(path: str, old: bytes | None, new: bytes) -> BbtcError:
     return BbtcError.single("BBT0008", _diff(path, old, new), hint="run the same command without --check")
 
 
-def _replace(path: str, data: bytes) -> None:
+def _replace(path: str, data: bytes, scratch: str | None) -> None:
     target = Path(os.path.realpath(path))  # through a symbolic link, not over it
     temporary = None
     try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        folder = target.parent
+        if scratch is not None and Path(scratch).stat().st_dev == folder.stat().st_dev:
+            folder = Path(scratch)
+        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=folder)
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
         mode = target.stat().st_mode & 0o777 if target.exists() else 0o666 & ~_umask()

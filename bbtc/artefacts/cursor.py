@@ -7,14 +7,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from fractions import Fraction
-from typing import TypeVar
+from functools import partial
+from typing import TypeAlias, TypeVar
 
 from bbtc.artefacts.jsontext import Path, locate, path_text
 from bbtc.artefacts.numbers import MAX_LENGTH, parse_number
 from bbtc.diagnostics import BbtcError, Diagnostic
-from bbtc.source import SourceFile
+from bbtc.source import SourceFile, Span
 
 _T = TypeVar("_T")
+
 
 _MOST_FAULTS = 50
 _MOST_COMPARED = 2000  # names a misspelt one is compared with
@@ -32,6 +34,15 @@ class Fault(Exception):
         self.message = message
         self.hint = hint
         super().__init__(message)
+
+
+Locate: TypeAlias = Callable[[Sequence[Fault]], Sequence["Span | None"]]
+"""Finds the places of faults."""
+
+
+def _places(source: SourceFile, faults: Sequence[Fault]) -> list[Span | None]:
+    spans = locate(source, [fault.path for fault in faults])
+    return [spans.get(fault.path) for fault in faults]
 
 
 class Stop(Exception):
@@ -82,25 +93,26 @@ class Faults:
         if self._found:
             raise Stop
 
-    def error(self, source: SourceFile | None) -> BbtcError:
-        """The faults as diagnostics, with places if the text is at hand."""
-        spans = locate(source, [fault.path for fault in self._found]) if source else {}
+    def error(self, places: Locate | None) -> BbtcError:
+        """The faults as diagnostics, with places if these are known."""
+        spans = places(self._found) if places else [None] * len(self._found)
         return BbtcError(
-            Diagnostic(
-                fault.code, f"at {path_text(fault.path)}: {fault.message}", spans.get(fault.path), fault.hint
-            )
-            for fault in self._found
+            Diagnostic(fault.code, f"at {path_text(fault.path)}: {fault.message}", span, fault.hint)
+            for fault, span in zip(self._found, spans, strict=True)
         )
 
 
-def run_reader(read: Callable[[Faults], _T], source: SourceFile | None) -> _T:
-    """The result of ``read``. Raises :class:`BbtcError` with every fault it met."""
+def run_reader(read: Callable[[Faults], _T], source: SourceFile | None, places: Locate | None = None) -> _T:
+    """The result of ``read``. Raises :class:`BbtcError` with every fault it met; ``source`` is the JSON
+    text for their places, unless ``places`` finds them."""
     faults = Faults()
     try:
         result = faults.require(lambda: read(faults))
         faults.stop_if_any()
     except Stop:
-        raise faults.error(source) from None
+        if places is None and source is not None:
+            places = partial(_places, source)
+        raise faults.error(places) from None
     return result
 
 

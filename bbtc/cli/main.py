@@ -6,6 +6,7 @@ usage; 3 a limit stopped the work; 70 internal error; 130 interrupted.
 
 from __future__ import annotations
 
+import keyword
 import sys
 from importlib import import_module
 
@@ -23,6 +24,9 @@ COMMANDS = {
     "run": "Watch a tree tick against the simulated world.",
     "diff": "Tell what changed from one tree to another.",
     "export": "Write a tree for people or for an execution engine.",
+    "import": "Read an exported tree back, with what was edited in it.",
+    "build": "Build every artefact of a project that is out of date.",
+    "init": "Make a small project to start from.",
     "explain": "Explain what a code of a message means.",
 }
 
@@ -43,7 +47,8 @@ class LazyGroup(click.Group):
         """The command, imported now."""
         if cmd_name not in COMMANDS:
             return None
-        command = import_module(f"bbtc.cli.{cmd_name}").command
+        module = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
+        command = import_module(f"bbtc.cli.{module}").command
         assert isinstance(command, click.Command)
         return command
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from fractions import Fraction
+from functools import cache
 from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
@@ -84,11 +85,13 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
         "btcpp": "bbtc.export.btcpp:btcpp",
         "btcpp_palette": "bbtc.export.btcpp_palette:btcpp_palette",
         "py_trees": "bbtc.export.pytrees:py_trees",
+        "py_trees_robot": "bbtc.export.pytrees_robot:py_trees_robot",
+        "prism": "bbtc.export.prism:prism",
+        "jani": "bbtc.export.jani:jani",
         "mermaid": "bbtc.export.mermaid:mermaid",
         "text": "bbtc.export.text:text",
         "json": "bbtc.artefacts.formats:json_format",
         "yaml": "bbtc.artefacts.formats:yaml_format",
-        "py_trees_robot": "bbtc.export.pytrees_robot:py_trees_robot",
     }
 )
 
@@ -163,10 +166,12 @@ def _parse_value(format_name: str, option: Option, text: str) -> OptionValue:
     )
 
 
-def _plugins() -> list[EntryPoint]:
+@cache
+def _plugins() -> tuple[EntryPoint, ...]:
+    # Looking through all that is installed takes long, and a build asks for every export.
     from importlib.metadata import entry_points
 
-    return list(entry_points(group=GROUP))
+    return tuple(entry_points(group=GROUP))
 
 
 def _load_plugin(point: EntryPoint) -> object:

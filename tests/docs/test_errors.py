@@ -24,7 +24,18 @@ from bbtc.syntax.parser import parse
 REPOSITORY = Path(__file__).parents[2]
 PAGES = REPOSITORY / "docs" / "errors"
 EXAMPLE = re.compile(r"^## (Wrong|Right)\n\n```pddl\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-WORDS_ALONE = {"BBT0408", "BBT0502", "BBT0613", "BBT0702", "BBT0703", "BBT0705", "BBT0706", "BBT0803", "BBT0804"}
+WORDS_ALONE = {
+    "BBT0408",
+    "BBT0502",
+    "BBT0613",
+    "BBT0702",
+    "BBT0703",
+    "BBT0705",
+    "BBT0706",
+    "BBT1006",
+    "BBT0803",
+    "BBT0804",
+}
 
 
 def examples(code: str) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from importlib.metadata import EntryPoint
 
 import pytest
@@ -36,10 +35,8 @@ not_an_exporter = 7
 
 def install(monkeypatch: pytest.MonkeyPatch, **plugins: str) -> None:
     """Make entry points of the group visible, by name and value."""
-    points = [EntryPoint(name, value, registry.GROUP) for name, value in plugins.items()]
-    monkeypatch.setattr(
-        importlib.metadata, "entry_points", lambda group: points if group == registry.GROUP else []
-    )
+    points = tuple(EntryPoint(name, value, registry.GROUP) for name, value in plugins.items())
+    monkeypatch.setattr(registry, "_plugins", lambda: points)
 
 
 def code_of(error: pytest.ExceptionInfo[BbtcError]) -> str:

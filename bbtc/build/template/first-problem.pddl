@@ -1,0 +1,6 @@
+(define (problem water-the-fern)
+  (:domain greenhouse)
+  (:objects fern - plant)
+  (:init (unknown (moist fern)))
+  (:goal (moist fern))
+  (:goal-probability 0.9))

@@ -1,0 +1,1 @@
+"""The manifest of a project: ``bbtc.yaml``, or ``[tool.bbtc]`` in ``pyproject.toml``."""
