@@ -34,6 +34,9 @@ def inner_scope(names: Names, groups: ast.TypedList, scope: Scope) -> tuple[tupl
             fresh += "'"
         taken.add(fresh)
         renamed = Parameter(fresh, parameter.types, parameter.span)
+        if parameter.name in inside:
+            # Stays taken, under a key that no name in a file has: it may not be used further in.
+            inside[f"{fresh} is taken"] = inside[parameter.name]
         inside[parameter.name] = renamed
         result.append(renamed)
     return tuple(result), inside
