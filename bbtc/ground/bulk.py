@@ -48,6 +48,16 @@ def chunks(rows: list[Row]) -> Iterator[list[Row]]:
     return (rows[start : start + CHUNK] for start in range(0, len(rows), CHUNK))
 
 
+def consumed(rows: list[Row]) -> Iterator[list[Row]]:
+    """:func:`chunks`, each of which is gone from the rows once it is handed out: a million rows take
+    100 MB that what is made of them soon needs."""
+    rows.reverse()
+    while rows:
+        chunk = rows[: -CHUNK - 1 : -1]
+        del rows[-CHUNK:]
+        yield chunk
+
+
 class Shared(Generic[T]):
     """What is made of argument rows where only some of the arguments matter.
 

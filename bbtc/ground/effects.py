@@ -454,7 +454,9 @@ def _arranged(part: _Part) -> tuple[Factor, ...]:
         only = part.factors[0]
         if not (part.sets or part.reward or part.cost):
             return (only,)
-        return (Factor(merge_outcomes(_join(part, outcome) for outcome in only.outcomes), only.oneof),)
+        joined = merge_outcomes(_join(part, outcome) for outcome in only.outcomes)
+        # With what is certain, all branches may come to the same.
+        return (Factor(joined, only.oneof),) if len(joined) > 1 else arrange([Factor(joined)])
     plain = Outcome(ONE, part.effects(), (), part.reward, part.cost)
     own = (Factor((plain,)),) if part.sets or part.reward or part.cost else ()
     return (*own, *part.factors)

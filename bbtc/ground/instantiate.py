@@ -6,15 +6,15 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
-from itertools import repeat
-from operator import is_, itemgetter
+from itertools import compress, repeat
+from operator import itemgetter
 
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.atoms import Atoms
-from bbtc.ground.bulk import CHUNK, instances
+from bbtc.ground.bulk import consumed, instances
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
 from bbtc.ground.effects import EffectLowering, LoweredEffect
 from bbtc.ground.goal import unreachable
@@ -25,6 +25,7 @@ from bbtc.ground.reach import Reach, reach
 from bbtc.ground.relevance import Relevance
 from bbtc.ground.start import Beginning, beginning
 from bbtc.ground.universe import Row
+from bbtc.ground.usage import called
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.model import domain as md
@@ -52,7 +53,8 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
 
 
 def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
-    """:func:`ground` without leaving out what cannot matter to the goal."""
+    """:func:`ground` without leaving out what cannot matter to the goal: every action that can apply
+    and do something, or that a template calls."""
     with _collector_paused():
         begin, reached = _reached(model, report, limits)
         builder = _TaskBuilder(Atoms(reached), report, begin, limits)
@@ -181,11 +183,11 @@ class _TaskBuilder:
 
     def _actions(self, rows: list[list[Row]]) -> tuple[gt.GroundAction, ...]:
         """Every action that can ever apply, sorted by name."""
-        called = self._called()
+        names = called(self.model)
         made: dict[str, list[gt.GroundAction]] = {}
         for schema, each in zip(self.model.schemas.values(), rows, strict=True):
             made[schema.name] = self._instances(schema, each)
-            if schema.name in called:
+            if schema.name in names:
                 self._rows[schema.name] = {self.universe.row(action.args) for action in made[schema.name]}
         ordered = (action for name in sorted(made, key=lambda name: f"{name}(") for action in made[name])
         if self.universe.sorts_like_names:
@@ -193,21 +195,16 @@ class _TaskBuilder:
         return tuple(sorted(ordered, key=lambda action: action.name))
 
     def _instances(self, schema: md.Schema, rows: list[Row]) -> list[gt.GroundAction]:
-        """The actions of a schema with the given rows, which are used up. They are made some
-        thousands at a time, and the rows given up as it goes: a million of them take 100 MB."""
+        """The actions of a schema with the given rows, which are used up."""
         conditions = self.lowering.reached(schema.precondition, schema.parameters)
         effects = self.effects.reached(self.reached.usage.blocks[schema.name], schema.parameters)
         unit, counts_cost = Fraction(1), self.model.counts_cost
         made: list[gt.GroundAction] = []
-        rows.reverse()
-        while rows:
+        for some in consumed(rows):
             self.limits.check_time("grounding")
-            chunk = rows[: -CHUNK - 1 : -1]
-            del rows[-CHUNK:]
-            found = conditions.all(chunk)
-            if any(map(is_, found, repeat(FALSE))):
-                chunk = [row for row, condition in zip(chunk, found, strict=True) if condition is not FALSE]
-                found = [condition for condition in found if condition is not FALSE]
+            found = conditions.all(some)
+            met = [condition is not FALSE for condition in found]
+            chunk, found = list(compress(some, met)), list(compress(found, met))
             done = effects.all(chunk)
             made += instances(
                 gt.GroundAction,
@@ -220,22 +217,6 @@ class _TaskBuilder:
                 repeat(schema.span),
             )
         return made
-
-    def _called(self) -> set[str]:
-        """Names of the schemas that template bodies call."""
-        bodies = [template.body for template in self.model.templates.values()]
-        found: set[str] = set()
-        while bodies:
-            match bodies.pop():
-                case md.BodyCall("action", name):
-                    found.add(name)
-                case md.BodyControl(_, children):
-                    bodies.extend(children)
-                case md.BodyForeach(_, child):
-                    bodies.append(child)
-                case _:
-                    pass
-        return found
 
     def is_action(self, name: str, row: Row) -> bool:
         """Whether an action with these arguments can ever apply."""

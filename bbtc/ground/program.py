@@ -2,11 +2,15 @@
 
 Every value of a ground atom is a fact of its own: ``t3(1,2)`` says that predicate 3 can be true of
 objects 1 and 2, ``f3`` that it can be false, ``u3`` unknown; ``a5(1,2)`` that action 5 can apply.
-Nothing is ever taken back (delete relaxation), and each branch of a chance can happen. Conditions
-are in negation normal form; disjunctions and universal quantifiers become auxiliary predicates,
-asked for only where the rest of their conjunction holds. "Can be false" starts from the closed
-world in the same way: only for atoms that something asks about (``n3`` are those not false at the
-start).
+Nothing is ever taken back (delete relaxation), and each branch of a chance can happen. ``e5(1,2)``
+says that action 5 can apply and do something: where that is not plain to see, it is what is read.
+
+Conditions are in negation normal form. Disjunctions and universal quantifiers become auxiliary
+predicates, asked for only for the objects that a context allows: where these are few, what the rest
+of the conjunction says of just these objects; else a disjunction of plain literals becomes a rule for
+each alternative, and what remains is asked for where all else holds. "Can be false" starts from the
+closed world in the same way: only for atoms that something asks about (``n3`` are those not false at
+the start).
 """
 
 from __future__ import annotations
@@ -14,9 +18,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from bbtc.ground.normal import Block, Item, conjuncts, disjuncts, free, normal_form
+from bbtc.ground.normal import Block, conjuncts, disjuncts, free, normal_form
 from bbtc.ground.universe import Universe
-from bbtc.ground.usage import Usage
+from bbtc.ground.usage import Usage, called
 from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
@@ -26,6 +30,10 @@ from bbtc.model.types import Parameter
 LETTER = {Truth.TRUE: "t", Truth.FALSE: "f", Truth.UNKNOWN: "u"}
 _FIRST_CHAIN = 9
 """A universal quantifier over fewer objects is written out; over more it becomes a chain."""
+_FEW = 20_000
+"""Up to so many bindings, a condition is asked for wherever its own objects allow it."""
+_MOST_ALTERNATIVES = 16
+"""So many rules at most take the place of one with disjunctions."""
 
 
 @dataclass(slots=True)
@@ -54,6 +62,7 @@ class ProgramBuilder:
         self._asked: set[str] = set()
         self._auxiliary = 0
         self._rules: list[str] = []
+        self._called = called(self.model)
 
     def build(self) -> Program:
         """All rules and facts."""
@@ -61,14 +70,11 @@ class ProgramBuilder:
         for rule in self.model.rules:
             self._derive(rule)
         for index, schema in enumerate(self.model.schemas.values()):
-            program.actions.append(f"a{index}")
-            self._applicable(f"a{index}", schema.parameters, schema.precondition)
-            head = _atom(f"a{index}", schema.parameters)
-            self._effects(self.usage.blocks[schema.name], head, (), ())
-            self._bound(self.usage.blocks[schema.name], self._count(schema.parameters))
+            self._action(index, schema)
         for index, template in enumerate(self.model.templates.values()):
             program.templates.append(f"m{index}")
-            self._applicable(f"m{index}", template.parameters, template.precondition)
+            precondition = conjuncts(normal_form(template.precondition))
+            self._applicable(f"m{index}", template.parameters, precondition)
         self._facts()
         program.lines.extend(self._rules)
         return program
@@ -83,8 +89,8 @@ class ProgramBuilder:
                 lines.extend(_fact(f"n{number}", row) for row in start.never_false.get(name, ()))
             if not self.usage.is_static(name) or name in self.usage.derived:
                 outputs.update({f"{letter}{number}": arity for letter in LETTER.values()})
-        for index, schema in enumerate(self.model.schemas.values()):
-            outputs[f"a{index}"] = len(schema.parameters)
+        for name, schema in zip(self.program.actions, self.model.schemas.values(), strict=True):
+            outputs[name] = len(schema.parameters)
         for index, template in enumerate(self.model.templates.values()):
             outputs[f"m{index}"] = len(template.parameters)
 
@@ -104,72 +110,138 @@ class ProgramBuilder:
 
     def _derive(self, rule: md.Rule) -> None:
         number = self.number[rule.predicate]
-        context = self._typed(rule.parameters, ())
-        body = self._conjunction(conjuncts(normal_form(rule.condition)), context)
-        if body is not None:
+        parts = conjuncts(normal_form(rule.condition))
+        for body in self._bodies(parts, rule.parameters, rule.parameters):
             self._rule(self._call(f"t{number}", rule.args), body)
         if self.usage.can_be_unknown(rule.predicate):
             # Where the rule reads something unknown is not traced further: any atom may be.
-            self._rule(self._call(f"u{number}", rule.args), context)
+            self._rule(self._call(f"u{number}", rule.args), self._typed(rule.parameters, ()))
 
-    def _applicable(self, name: str, parameters: tuple[Parameter, ...], precondition: mf.Formula) -> None:
-        """Rules for the bindings that satisfy the precondition."""
-        simple: list[mf.Formula] = []
-        rest: list[mf.Formula] = []
-        for part in conjuncts(normal_form(precondition)):
-            (simple if self._is_simple(part) else rest).append(part)
-        body = self._conjunction(simple, self._typed(parameters, simple))
-        if body is None:
-            return
-        head = _atom(name, parameters)
+    def _applicable(self, name: str, parameters: tuple[Parameter, ...], parts: Iterable[mf.Formula]) -> None:
+        """Rules for the bindings that satisfy all parts of a precondition."""
         self.program.bound += self._count(parameters)
-        if not rest:
+        for body in self._bodies(parts, parameters, parameters):
+            self._rule(_atom(name, parameters), body)
+
+    def _action(self, index: int, schema: md.Schema) -> None:
+        """Where an action can apply, what it may set, and where it may set anything. What a template
+        calls is kept even where it does nothing, so that the call can succeed."""
+        parameters, block = schema.parameters, self.usage.blocks[schema.name]
+        self._bound(block, self._count(parameters))
+        precondition = list(conjuncts(normal_form(schema.precondition)))
+        groups = list(_groups(block, (), ()))
+        kept = schema.name in self._called
+        if not kept and len(groups) == 1 and not groups[0].parameters:
+            # Nothing happens where the only guard is false: it may as well be a precondition.
+            precondition += groups[0].guard
+            groups = [_Group((), (), groups[0].leaves)]
+        self._applicable(f"a{index}", parameters, precondition)
+        action, shown = _atom(f"a{index}", parameters), _atom(f"e{index}", parameters)
+        always = kept or any(
+            not group.parameters and not group.guard and any(map(_shows, group.leaves)) for group in groups
+        )
+        self.program.actions.append(f"{'a' if always else 'e'}{index}")
+        for group in groups:
+            scope = parameters + group.parameters
+            for body in self._bodies(group.guard, group.parameters, scope, (action,)):
+                if not always:
+                    self._shown(shown, group, body)
+                self._settings(group, scope, body)
+
+    def _shown(self, head: str, group: _Group, body: list[str]) -> None:
+        """Making false does something only where the atom may be something else."""
+        if any(map(_shows, group.leaves)):
             self._rule(head, body)
             return
-        candidate = _atom(f"c{name}", parameters)
-        self._rule(candidate, body)
-        found = self._conjunction(rest, [candidate])
-        if found is not None:
-            self._rule(head, found)
+        for leaf in group.sets:
+            letters = "tu" if self.usage.can_be_unknown(leaf.predicate) else "t"
+            for letter in letters:
+                self._rule(head, [*body, self._call(f"{letter}{self.number[leaf.predicate]}", leaf.args)])
 
-    def _effects(
-        self, block: Block, action: str, around: tuple[Parameter, ...], guard: tuple[mf.Formula, ...]
-    ) -> None:
-        for item in block.items:
-            if isinstance(item.leaf, me.Set):
-                self._effect(item, item.leaf, action, around, guard)
-        for chance in block.chances:
-            for _, branch in chance.branches:
-                self._effects(branch, action, around + chance.parameters, guard + chance.guard)
-
-    def _effect(
-        self,
-        item: Item,
-        leaf: me.Set,
-        action: str,
-        around: tuple[Parameter, ...],
-        guard: tuple[mf.Formula, ...],
-    ) -> None:
-        guard += item.guard
-        simple = [part for part in guard if self._is_simple(part)]
-        context = [action, *self._typed(around + item.parameters, simple)]
-        body = self._conjunction(simple, context)
-        if body is not None:
-            body = self._conjunction((part for part in guard if not self._is_simple(part)), body)
-        if body is not None:
+    def _settings(self, group: _Group, scope: tuple[Parameter, ...], body: list[str]) -> None:
+        """What is set by leaves of one guard. Several start from what they mention."""
+        if len(group.sets) > 1:
+            terms = dict.fromkeys(term for leaf in group.sets for term in leaf.args if mf.is_parameter(term))
+            if len(body) > 1 or len(terms) < len(scope):
+                body = self._named(body, terms)
+        for leaf in group.sets:
             self._rule(self._call(f"{LETTER[leaf.value]}{self.number[leaf.predicate]}", leaf.args), body)
+
+    # --- rule bodies -------------------------------------------------------------------------
+
+    def _bodies(
+        self,
+        formulas: Iterable[mf.Formula],
+        parameters: tuple[Parameter, ...],
+        scope: tuple[Parameter, ...],
+        base: tuple[str, ...] = (),
+        most: int = _MOST_ALTERNATIVES,
+    ) -> Iterator[list[str]]:
+        """Bodies of rules that together say where all the formulas, in normal form, can hold: ``base``
+        binds what is in ``scope`` besides ``parameters``."""
+        parts = list(formulas)
+        simple = [part for part in parts if self._is_simple(part)]
+        complex_ = [part for part in parts if not self._is_simple(part)]
+        near = [part for part in complex_ if self._count(_read(part, scope)) <= _FEW]
+        far = [part for part in complex_ if part not in near]
+        for part in far:
+            alternatives = list(disjuncts(part))
+            if 1 < len(alternatives) <= most:
+                others = [other for other in parts if other is not part]
+                for each in alternatives:
+                    chosen = [*others, *conjuncts(each)]
+                    yield from self._bodies(chosen, parameters, scope, base, most // len(alternatives))
+                return
+        body = self._conjunction(simple, [*base, *self._typed(parameters, simple)])
+        for part in near:
+            body = self._with(part, body, self._near(part, simple, scope))
+        if far and body is not None:
+            candidate = _atom(self._fresh(), scope)
+            self._rule(candidate, body)
+            body = [candidate]
+            for part in far:
+                body = self._with(part, body, self._named([candidate], free(part)))
+        if body is not None:
+            yield body
+
+    def _near(self, part: mf.Formula, simple: list[mf.Formula], scope: tuple[Parameter, ...]) -> list[str]:
+        """A context for a part: its parameters, and the atoms that hold of nothing else."""
+        parameters = _read(part, scope)
+        names = {parameter.name for parameter in parameters}
+        atoms = [each for each in simple if isinstance(each, mf.Atom) and names.issuperset(free(each))]
+        context = self._conjunction(atoms, self._typed(parameters, atoms))
+        assert context is not None
+        return self._named(context, names) if len(context) > 1 else context
+
+    def _named(self, body: list[str], terms: Iterable[mf.Term]) -> list[str]:
+        """A predicate of its own for what a body says of some parameters."""
+        head = _written(self._fresh(), map(_variable, sorted(terms)))
+        self._rule(head, body)
+        return [head]
+
+    def _with(self, part: mf.Formula, body: list[str] | None, context: list[str]) -> list[str] | None:
+        """The body and the literals of a complex part; None if they can never be true."""
+        if body is None:
+            return None
+        literals = list(self._complex(part, context))
+        found = [literal for literal in literals if literal is not None]
+        return [*body, *found] if len(found) == len(literals) else None
 
     # --- conditions --------------------------------------------------------------------------
 
     def _conjunction(self, parts: Iterable[mf.Formula], context: list[str]) -> list[str] | None:
         """The context with the literals of some parts; None if they can never be true."""
-        body = list(context)
+        body: list[str] | None = list(context)
         for part in parts:
-            literals = self._simple(part) if self._is_simple(part) else self._complex(part, body)
-            for literal in literals:
-                if literal is None:
-                    return None
-                body.append(literal)
+            if body is None:
+                return None
+            if self._is_simple(part):
+                for literal in self._simple(part):
+                    if literal is None:
+                        return None
+                    body.append(literal)
+            else:
+                body = self._with(part, body, body)
         return body
 
     def _is_simple(self, part: mf.Formula) -> bool:
@@ -330,6 +402,43 @@ class ProgramBuilder:
 
     def _rule(self, head: str, body: list[str]) -> None:
         self._rules.append(f"{head} :- {', '.join(body)}." if body else f"{head}.")
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """The leaves of an effect under one guard, for every binding of the parameters."""
+
+    parameters: tuple[Parameter, ...]
+    guard: tuple[mf.Formula, ...]
+    leaves: list[me.Set | me.Add]
+
+    @property
+    def sets(self) -> list[me.Set]:
+        """The leaves that set an atom."""
+        return [leaf for leaf in self.leaves if isinstance(leaf, me.Set)]
+
+
+def _groups(block: Block, around: tuple[Parameter, ...], guard: tuple[mf.Formula, ...]) -> Iterator[_Group]:
+    """The leaves of a block, of all branches of its chances, by parameters and guard."""
+    found: dict[tuple[tuple[Parameter, ...], tuple[mf.Formula, ...]], list[me.Set | me.Add]] = {}
+    for item in block.items:
+        found.setdefault((around + item.parameters, guard + item.guard), []).append(item.leaf)
+    for (parameters, guards), leaves in found.items():
+        yield _Group(parameters, guards, leaves)
+    for chance in block.chances:
+        for _, branch in chance.branches:
+            yield from _groups(branch, around + chance.parameters, guard + chance.guard)
+
+
+def _shows(leaf: me.Set | me.Add) -> bool:
+    """Whether it can matter that the leaf happens, whatever holds: costs alone do not."""
+    return leaf.to == "reward" if isinstance(leaf, me.Add) else leaf.value is not Truth.FALSE
+
+
+def _read(part: mf.Formula, scope: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    """The parameters that a part reads."""
+    names = free(part)
+    return tuple(parameter for parameter in scope if parameter.name in names)
 
 
 def _variable(name: str) -> str:

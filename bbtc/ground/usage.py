@@ -99,3 +99,20 @@ def items(block: Block, around: tuple[Parameter, ...]) -> Iterator[tuple[Item, t
     for chance in block.chances:
         for _, branch in chance.branches:
             yield from items(branch, around + chance.parameters)
+
+
+def called(model: md.Model) -> set[str]:
+    """Names of the schemas that template bodies call."""
+    bodies = [template.body for template in model.templates.values()]
+    found: set[str] = set()
+    while bodies:
+        match bodies.pop():
+            case md.BodyCall("action", name):
+                found.add(name)
+            case md.BodyControl(_, children):
+                bodies.extend(children)
+            case md.BodyForeach(_, child):
+                bodies.append(child)
+            case _:
+                pass
+    return found

@@ -172,8 +172,16 @@ def _may_set(model: md.Model, effect: me.Effect, binding: Binding, reachable: Re
             return {each for part in possible for each in _may_set(model, part, binding, reachable)}
 
 
+def _does_something(model: md.Model, schema: md.Schema, binding: Binding, reachable: Reachable) -> bool:
+    """Whether some effect can happen; making false what can be nothing else is none."""
+    return any(
+        value is not F or (atom, T) in reachable or (atom, U) in reachable
+        for atom, value in _may_set(model, schema.effect, binding, reachable)
+    )
+
+
 def relaxed(model: md.Model) -> tuple[Reachable, dict[str, tuple[md.Schema, Binding]]]:
-    """Every value each atom can have, and every action that can apply, by name."""
+    """Every value each atom can have, and every action that can apply and do something, by name."""
     reachable: Reachable = set(start(model).items())
     actions: dict[str, tuple[md.Schema, Binding]] = {}
     while True:
@@ -185,4 +193,8 @@ def relaxed(model: md.Model) -> tuple[Reachable, dict[str, tuple[md.Schema, Bind
                     actions[f"{schema.name}({args})"] = schema, binding
                     reachable |= _may_set(model, schema.effect, binding, reachable)
         if (len(reachable), len(actions)) == before:
-            return reachable, actions
+            return reachable, {
+                name: (schema, binding)
+                for name, (schema, binding) in actions.items()
+                if _does_something(model, schema, binding, reachable)
+            }

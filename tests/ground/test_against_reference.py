@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from fractions import Fraction
 from math import prod
+from unittest.mock import patch
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import BbtcError, Report
+from bbtc.ground import bulk, program, relevance
 from bbtc.ground.condition import evaluate
 from bbtc.ground.instantiate import ground, instantiate
 from bbtc.ground.prune import prune
@@ -28,10 +31,35 @@ _SETTINGS = settings(
 )
 
 
-def _grounded(text: str) -> tuple[Model, Task | None]:
+_BOUNDS = {
+    (program, "_FEW"): st.integers(0, 3),
+    (program, "_MOST_ALTERNATIVES"): st.integers(1, 4),
+    (program, "_FIRST_CHAIN"): st.integers(0, 3),
+    (bulk, "CHUNK"): st.integers(1, 3),
+    (bulk, "_MOST_SHARED"): st.integers(0, 3),
+    (relevance, "_SWEEPS"): st.integers(0, 2),
+}
+
+
+def bounds() -> st.SearchStrategy[list[int]]:
+    """Other bounds of what is done in which of several ways: small ones, as if the task were large, or
+    none."""
+    return st.one_of(st.just([]), st.tuples(*_BOUNDS.values()).map(list))
+
+
+@contextmanager
+def _bounded(sizes: list[int]) -> Iterator[None]:
+    with ExitStack() as stack:
+        for (module, name), size in zip(_BOUNDS, sizes, strict=False):
+            stack.enter_context(patch.object(module, name, size))
+        yield
+
+
+def _grounded(text: str, sizes: list[int]) -> tuple[Model, Task | None]:
     model, report = model_of(text), Report()
     try:
-        return model, instantiate(model, report, Limits())
+        with _bounded(sizes):
+            return model, instantiate(model, report, Limits())
     except BbtcError as error:
         if any(d.code != "BBT0412" for d in report.errors):
             raise AssertionError(text) from error
@@ -80,9 +108,9 @@ def _successors(change: Change, state: list[Truth]) -> tuple[Truth, ...]:
 
 
 @_SETTINGS
-@given(lifted_texts())
-def test_what_is_reachable_is_what_enumeration_finds(text: str) -> None:
-    model, task = _grounded(text)
+@given(lifted_texts(), bounds())
+def test_what_is_reachable_is_what_enumeration_finds(text: str, sizes: list[int]) -> None:
+    model, task = _grounded(text, sizes)
     reachable, actions = reference.relaxed(model)
     assert model.goal is not None
     if task is None:
@@ -99,9 +127,9 @@ def test_what_is_reachable_is_what_enumeration_finds(text: str) -> None:
 
 
 @_SETTINGS
-@given(lifted_texts(), st.data())
-def test_conditions_and_outcomes_mean_the_same(text: str, data: st.DataObject) -> None:
-    model, task = _grounded(text)
+@given(lifted_texts(), bounds(), st.data())
+def test_conditions_and_outcomes_mean_the_same(text: str, sizes: list[int], data: st.DataObject) -> None:
+    model, task = _grounded(text, sizes)
     if task is None:
         return
     possible = _possible(model)
@@ -140,15 +168,16 @@ def _compare_outcomes(
 
 
 @_SETTINGS
-@given(lifted_texts(), st.data())
-def test_pruning_keeps_what_matters(text: str, data: st.DataObject) -> None:
+@given(lifted_texts(), bounds(), st.data())
+def test_pruning_keeps_what_matters(text: str, sizes: list[int], data: st.DataObject) -> None:
     """On the variables that are left, every kept action does the same as before; what is left out
     sets none of them."""
-    _, task = _grounded(text)
+    _, task = _grounded(text, sizes)
     if task is None:
         return
     small = prune(task)
-    assert small == ground(model_of(text), Report(), Limits())
+    with _bounded(sizes):
+        assert small == ground(model_of(text), Report(), Limits())
     state = [data.draw(st.sampled_from(sorted(variable.values))) for variable in task.variables]
     kept = [task.variable_index[variable.name] for variable in small.variables]
     part = [state[index] for index in kept]

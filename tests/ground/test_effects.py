@@ -97,6 +97,11 @@ def test_equal_outcomes_are_merged_and_impossible_ones_dropped() -> None:
     ]
 
 
+def test_branches_that_add_nothing_to_what_is_certain_are_no_chance() -> None:
+    assert _act("(and (r) (oneof (r) (and)))") == ["1: r()=true"]
+    assert not _task("(and (r) (oneof (r) (and)))").action_by_name["act()"].factors[0].oneof
+
+
 def test_a_oneof_is_marked_and_counts_as_equally_likely() -> None:
     task = _task("(oneof (not (p)) (not (q)) (and))", "(p) (q)")
     (factor,) = task.action_by_name["act()"].factors
@@ -223,6 +228,20 @@ def test_quantifiers_side_by_side_may_use_one_name() -> None:
         (define (problem x) (:domain d) (:init) (:goal (done)))"""
     )
     assert describe(task, task.action_by_name["end()"].precondition) == "(p(a) and q(b))"
+
+
+def test_a_quantifier_two_levels_down_may_use_a_name_from_outside() -> None:
+    model = model_of(
+        """(define (domain d) (:types t) (:constants a b c - t) (:predicates (s ?x - t) (p))
+        (:action act :parameters (?y - t) :effect
+          (and (forall (?y - t) (forall (?y - t) (p))) (forall (?z - t) (s ?y)))))
+        (define (problem x) (:domain d) (:init) (:goal (s a)))"""
+    )
+    task = instantiate(model, Report(), Limits())
+    for action in task.actions:
+        (outcome,) = action.factors[0].outcomes
+        names = [task.variables[index].name for effect in outcome.effects for index, _ in effect.sets]
+        assert names == ["p()", f"s({action.args[0]})"]
 
 
 def test_an_object_outside_the_declared_type_of_a_predicate_stays_outside_that_of_an_action() -> None:
