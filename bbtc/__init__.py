@@ -11,6 +11,8 @@ from importlib import import_module
 from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any
 
+from bbtc.version import __version__
+
 if TYPE_CHECKING:
     from bbtc.api import (
         bounds,
@@ -36,8 +38,6 @@ if TYPE_CHECKING:
     from bbtc.source import SourceFile
     from bbtc.tree.nodes import Tree
 
-__version__ = "0.1.0"
-
 __all__ = [
     "BbtcError",
     "Diagnostic",
@@ -50,6 +50,7 @@ __all__ = [
     "SourceFile",
     "Task",
     "Tree",
+    "__version__",
     "bounds",
     "build",
     "check",

@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import bbtc
 from bbtc.diagnostics import BbtcError
 from bbtc.files import write
+from bbtc.version import __version__
 
 FOLDER = ".bbtc"
 _FORMAT = "bbtc-build"
@@ -63,19 +63,19 @@ def settings_digest(*settings: object) -> str:
 def tool_version() -> str:
     """The version of bbtc, and a digest of what is installed: a changed copy of the same version
     builds anew."""
-    package = Path(bbtc.__file__).parent
-    record = package.parent / f"bbtc-{bbtc.__version__}.dist-info" / "RECORD"
+    package = Path(__file__).parents[1]
+    record = package.parent / f"bbtc-{__version__}.dist-info" / "RECORD"
     with contextlib.suppress(OSError):
         listed = [line for line in record.read_bytes().splitlines() if line.startswith(b"bbtc/")]
         if listed:
-            return f"{bbtc.__version__}+{digest(b''.join(sorted(listed)))[:16]}"
+            return f"{__version__}+{digest(b''.join(sorted(listed)))[:16]}"
     whole = hashlib.sha256()
     for folder, folders, names in os.walk(package):
         folders.sort()
         for name in sorted(names):
             if name.endswith(".py"):
                 whole.update(Path(folder, name).read_bytes())
-    return f"{bbtc.__version__}+{whole.hexdigest()[:16]}"
+    return f"{__version__}+{whole.hexdigest()[:16]}"
 
 
 def plugin_version(form: str) -> str:

@@ -12,7 +12,7 @@ from importlib import import_module
 
 import click
 
-from bbtc import __version__
+from bbtc.version import __version__
 
 COMMANDS = {
     "fmt": "Give domains and problems their canonical layout.",
