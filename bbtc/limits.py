@@ -58,6 +58,10 @@ class Limits:
         """The same bounds, with the time counted from now."""
         return replace(self, _start=time.monotonic())
 
+    def afresh(self) -> Limits:
+        """The same bounds, with the time counted from now."""
+        return replace(self, _start=time.monotonic())
+
     @property
     def remaining(self) -> float | None:
         """Seconds left, not below 0; None without a bound."""

@@ -222,6 +222,13 @@ def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
     return figures(tree.task, tree.root, chain), chain
 
 
+def process_text(task: Task, form: str) -> str:
+    """The task as a Markov decision process, in the format ``prism`` or ``jani``."""
+    from bbtc.export import jani, prism
+
+    return prism.task_text(task) if form == "prism" else jani.task_text(task)
+
+
 def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
     """The figures of a tree, recomputed without the simulator and the planner. Raises
     ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer."""

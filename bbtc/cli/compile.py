@@ -13,10 +13,11 @@ from bbtc.files import write, write_depfile
 @click.argument("files", nargs=-1, required=True, metavar="DOMAIN [PROBLEM]")
 @click.option(
     "--emit",
-    type=click.Choice(["ast", "model", "ground"]),
+    type=click.Choice(["ast", "model", "ground", "prism", "jani"]),
     default="ground",
     show_default=True,
-    help="Which stage to write: the syntax trees, the resolved model, or the ground task.",
+    help="What to write: the syntax trees, the resolved model, the ground task, or the task as a Markov "
+    "decision process for model checkers.",
 )
 @grounding_limits
 @output_options
@@ -29,13 +30,16 @@ def command(
     check: bool,
     depfile: str | None,
 ) -> None:
-    """Parse, check and ground the PROBLEM of DOMAIN, and write the task as JSON."""
+    """Parse, check and ground the PROBLEM of DOMAIN, and write the task as JSON (or what --emit says)."""
     from bbtc import artefacts, pipeline
 
     sources = [session.read(file) for file in files]
-    if emit == "ground":
+    if emit in {"ground", "prism", "jani"}:
         task = pipeline.compile_sources(sources, session.report, session.limits, checks=True)
-        text = artefacts.dumps(artefacts.task_to_json(task))
+        if emit == "ground":
+            text = artefacts.dumps(artefacts.task_to_json(task))
+        else:
+            text = pipeline.process_text(task, emit)
         session.say(
             f"{task.domain}/{task.problem}: {len(task.variables)} variables, {len(task.actions)} actions, "
             f"{len(task.templates)} templates"

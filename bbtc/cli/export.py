@@ -15,6 +15,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.cli.verify import require_verified
 from bbtc.files import write, write_depfile, write_files
 from bbtc.plan.strategies import DEFAULT
 
@@ -50,6 +51,7 @@ def _list_formats(ctx: click.Context, _parameter: click.Parameter, value: bool) 
 )
 @click.option("--target", type=Probability(), help="With DOMAIN: wanted success probability.")
 @click.option("--strategy", default=DEFAULT, show_default=True, help="With DOMAIN: how to plan.")
+@click.option("--verify", "verified", is_flag=True, help="Write only if `bbtc verify` takes the tree.")
 @limit_options
 @output_options
 @session_command
@@ -60,6 +62,7 @@ def command(
     options: tuple[str, ...],
     target: Fraction | None,
     strategy: str,
+    verified: bool,
     output: str,
     check: bool,
     depfile: str | None,
@@ -81,6 +84,8 @@ def command(
     else:
         plan = run_planner(session, task_of(session, sources, limits), target, strategy, limits, quiet=True)
         tree, status = plan.tree, STATUS_EXIT[plan.tree.status]
+    if verified:
+        require_verified(session, tree)
     pairs = dict(_pair(option) for option in options)
     artefact = export_tree(tree, form, pairs, limits)
     if isinstance(artefact, Files):

@@ -22,6 +22,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.cli.verify import require_verified
 from bbtc.files import write, write_depfile
 from bbtc.plan.strategies import DEFAULT
 
@@ -57,6 +58,7 @@ STATUS_EXIT: dict[Status, int] = {
 )
 @click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
 @click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
+@click.option("--verify", "verified", is_flag=True, help="Write the tree only if `bbtc verify` takes it.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
 @limit_options
 @output_options
@@ -70,6 +72,7 @@ def command(
     retries: Retries,
     bounds: bool,
     as_json: bool,
+    verified: bool,
     quiet: bool,
     output: str,
     check: bool,
@@ -97,6 +100,8 @@ def command(
         wanted = task.goal_probability if target is None else target
         return _print_bounds(task, wanted, limits, options, output, as_json=as_json)
     plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet)
+    if verified:
+        require_verified(session, plan.tree)
     write(output, artefacts.dumps(artefacts.tree_to_json(plan.tree)), check=check)
     if depfile is not None:
         write_depfile(depfile, output, session.inputs)

@@ -11,6 +11,7 @@ from bbtc.cli.session import command as session_command
 from bbtc.files import write
 
 if TYPE_CHECKING:
+    from bbtc.tree.nodes import Tree
     from bbtc.verify.verdict import Engine, Verdict
 
 
@@ -43,6 +44,18 @@ def command(session: Session, tree: str, engine: Engine, as_json: bool, output: 
     else:
         write(output, "".join(f"{line}\n" for line in verdict_report(verdict)))
     verdict.raise_problems()
+
+
+def require_verified(session: Session, tree: Tree) -> None:
+    """Raise :class:`~bbtc.diagnostics.BbtcError` unless the tree is what it claims to be. This may take
+    as long as the time limit allows, counted anew: planning may have used all of it."""
+    from bbtc.pipeline import verify_tree
+
+    verdict = verify_tree(tree, session.limits.afresh())
+    verdict.raise_problems()
+    engines = ["our own solver"] if verdict.own is not None else []
+    engines += [f"Storm {verdict.storm.version}"] if verdict.storm is not None else []
+    session.say(f"verified by {' and '.join(engines)}")
 
 
 def verdict_report(verdict: Verdict) -> list[str]:

@@ -64,7 +64,13 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 _GO_ON: dict[str, Returned] = {"sequence": "success", "fallback": "failure", "skipper": "running"}
 
 
-def chain_of(task: Task, root: Node, form: Form | None = None, most_branches: int = MOST_BRANCHES) -> Program:
+def chain_of(
+    task: Task,
+    root: Node,
+    form: Form | None = None,
+    most_branches: int = MOST_BRANCHES,
+    most_written: int = MOST_WRITTEN,
+) -> Program:
     """The Markov chain. ``form`` None takes *guards* where the program stays small, else *walk*.
 
     Labels: ``success``, ``failure``, ``blocked`` (the ends), ``finished`` (any of them), ``goal`` (it
@@ -75,15 +81,16 @@ def chain_of(task: Task, root: Node, form: Form | None = None, most_branches: in
             return chain_of(task, root, "walk", most_branches)
         program = chain_of(task, root, "guards", most_branches)
         roots = [*program.roots(), *(formula.expression for formula in program.formulas)]
-        small = written_size(program) <= MOST_WRITTEN and nesting(roots) <= DEEPEST
+        small = written_size(program) <= most_written and nesting(roots) <= DEEPEST
         return program if small else chain_of(task, root, "walk", most_branches)
     writer = _Guards(task, root, most_branches) if form == "guards" else _Walk(task, root, most_branches)
     writer.write()
-    labels = [*writer.ends.items(), ("finished", any_of(*writer.ends.values()))]
+    finished = writer.draft.define("", "finished", any_of(*writer.ends.values()))
+    labels = [*writer.ends.items(), ("finished", finished)]
     goal = all_of(writer.start.begun, where_true(task.goal, writer.start.cell_of))
     labels += [("goal", goal), ("unready", any_of(*writer.unready))]
     stay = Branch(_ONE, (), (_ZERO, _ZERO, _ZERO))
-    final = Command(None, labels[3][1], (stay,), "the run is over")
+    final = Command(None, finished, (stay,), "the run is over")
     return Program(
         kind="dtmc",
         title=f"{task.domain}/{task.problem}",

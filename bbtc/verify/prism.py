@@ -66,7 +66,8 @@ class _Writer:
         yield ""
         for name, formula in zip(names.formulas, program.formulas, strict=True):
             yield f"formula {name} = {self.expression(formula.expression)};"
-        yield ""
+        if program.formulas:
+            yield ""
         yield f"module {'tree' if program.kind == 'dtmc' else 'task'}"
         for name, cell, remark in zip(names.cells, program.cells, names.cell_remarks, strict=True):
             yield f"  {name} : [0..{cell.highest}] init {cell.initial};{_comment(remark)}"
@@ -120,7 +121,7 @@ class _Writer:
                     value = (
                         str(number) if condition == YES else f"{self.inner(condition)} ? {number} : {value}"
                     )
-                return f"({name}'={value})"
+                return f"({name}'={value if value.isalnum() else f'({value})'})"
             case _:
                 assert_never(update)
 

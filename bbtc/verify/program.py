@@ -91,7 +91,16 @@ def any_of(*parts: Expression) -> Expression:
             kept.update(dict.fromkeys(part.parts if isinstance(part, AnyOf) else [part]))
     if any(isinstance(part, Negation) and part.part in kept for part in kept):
         return YES
+    if any(isinstance(part, AllOf) and any(none_of(p) in kept for p in part.parts) for part in kept):
+        return any_of(*(_besides(part, kept) for part in kept))
     return AnyOf(tuple(kept)) if len(kept) > 1 else next(iter(kept), NO)
+
+
+def _besides(part: Expression, others: Iterable[Expression]) -> Expression:
+    """What the part adds to a disjunction with others: without conditions that one of them negates."""
+    if not isinstance(part, AllOf):
+        return part
+    return all_of(*(inner for inner in part.parts if none_of(inner) not in others))
 
 
 def none_of(*parts: Expression) -> Expression:
@@ -110,7 +119,8 @@ def none_of(*parts: Expression) -> Expression:
 
 def is_atom(expression: Expression) -> bool:
     """Is it too small to deserve a name of its own?"""
-    return not isinstance(expression, AllOf | AnyOf)
+    inner = expression.part if isinstance(expression, Negation) else expression
+    return not isinstance(inner, AllOf | AnyOf)
 
 
 def parts_of(expression: Expression) -> tuple[Expression, ...]:

@@ -96,8 +96,9 @@ class Solver:
         """Columns x with x = P x, and with the given values in final states (others: 0). With
         ``earned`` = (r, w), every step adds its reward r, times w of the state it leads to."""
         columns = [[known.get(state, _ZERO) for state in range(len(self._rows))] for known in values]
-        for component in self._components:
-            self._limits.check_time("the recomputation")
+        for count, component in enumerate(self._components):
+            if count % 256 == 0:
+                self._limits.check_time("the recomputation")
             inside = [state for state in component if state in self._ending and state not in self._last]
             if inside:
                 self._solve_component(inside, columns, earned)
@@ -142,7 +143,8 @@ def eliminate(
     order: list[int] = []
     left = set(system)
     while left:
-        limits.check_time("the recomputation")
+        if len(left) % 16 == 0:
+            limits.check_time("the recomputation")
         # 1. The unknown whose elimination makes the least new entries.
         pivot = min(left, key=lambda s: (len(system[s]) * len(users[s] & left), s))
         left.remove(pivot)

@@ -1,0 +1,51 @@
+"""Exporter ``jani``: a tree and its task as a Markov chain in the interchange format of model checkers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bbtc.export.names import printable
+from bbtc.export.prism import FORM, readable_names, tree_program
+from bbtc.export.registry import Figures, Option, OptionValue
+from bbtc.ground.task import Task
+from bbtc.tree.nodes import Tree
+from bbtc.verify.jani import jani_model
+from bbtc.verify.process import process_of
+from bbtc.verify.program import Program
+
+_MOST_WRITTEN = 1_000  # JANI has no formulas: each use is written out
+
+
+@dataclass(frozen=True, slots=True)
+class JaniExporter:
+    """The same chain as the exporter ``prism`` writes. Deterministic."""
+
+    name: str = "jani"
+    description: str = "the same Markov chain in JANI, for Storm, the Modest Toolset, Momba"
+    suffix: str = ".jani"
+    options: tuple[Option, ...] = (FORM,)
+
+    def export(
+        self,
+        tree: Tree,
+        options: Mapping[str, OptionValue],
+        figures: Figures | None,  # noqa: ARG002 - of other exporters
+    ) -> str:
+        """The chain as JSON text."""
+        return _text(tree_program(tree, options, _MOST_WRITTEN))
+
+
+jani = JaniExporter()
+
+
+def task_text(task: Task) -> str:
+    """The decision process of a task: what any policy could do."""
+    return _text(process_of(task))
+
+
+def _text(program: Program) -> str:
+    model = jani_model(program, readable_names(program))
+    model["metadata"]["description"] = printable(program.title)
+    return json.dumps(model, indent=1, ensure_ascii=False) + "\n"
