@@ -22,9 +22,9 @@ from bbtc.source import Span
 from bbtc.syntax import ast
 
 _PROBLEM_ONLY = (ast.Init, ast.Goal, ast.GoalNumber, ast.Metric, ast.DomainReference, ast.Hidden)
-_LISTS = (ast.Requirements, ast.TypedSection, ast.Predicates, ast.Functions, ast.Hidden)
-_SEVERAL = (ast.Action, ast.Derived, ast.Sensor, ast.Template)
-"""What a domain has several of; of everything else one section is enough."""
+_LISTS = (ast.Requirements, ast.TypedSection, ast.Predicates, ast.Functions)
+_SEVERAL = (ast.Action, ast.Derived, ast.Sensor, ast.Template, ast.Hidden)
+"""What a definition has several of; of everything else one section is enough."""
 _DOMAIN_ONLY = (ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template)
 
 

@@ -318,7 +318,16 @@ class Builder:
         return ast.Init(_spliced(children[1:-1]), between(children[0], children[-1]))
 
     def hidden(self, children: list[Any]) -> ast.Hidden:
-        return ast.Hidden(_spliced(children[1:-1]), between(children[0], children[-1]))
+        facts = _spliced(children[1:-1])
+        for fact in facts:
+            if not isinstance(fact, ast.Assign):
+                raise Misuse(
+                    "BBT0101",
+                    "`:hidden` holds facts only",
+                    fact.span,
+                    "each is `(p a)` or `(not (p a))`; numbers and what is uncertain stand in `:init`",
+                )
+        return ast.Hidden(facts, between(children[0], children[-1]))
 
     def goal(self, children: list[Any]) -> ast.Goal:
         head, *formula, close = children
