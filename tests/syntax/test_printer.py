@@ -183,17 +183,16 @@ PAIRS = {
     ),
     "facts in one long row get a line each": (
         "(define (problem p) (:domain d) (:init "
-        + " ".join(f"(at thing-{n} place-{n})" for n in range(5))
+        + " ".join(f"(at thing-1{n} place-1{n})" for n in range(4))
         + ") (:goal (p)))",
         """\
 (define (problem p)
   (:domain d)
   (:init
-    (at thing-0 place-0)
-    (at thing-1 place-1)
-    (at thing-2 place-2)
-    (at thing-3 place-3)
-    (at thing-4 place-4))
+    (at thing-10 place-10)
+    (at thing-11 place-11)
+    (at thing-12 place-12)
+    (at thing-13 place-13))
   (:goal (p)))
 """,
     ),
