@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bbtc.belief.chain import Chain, explore
@@ -20,7 +20,7 @@ from bbtc.plan.result import Plan, Progress
 from bbtc.plan.strategies import run_strategy
 from bbtc.source import SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
-from bbtc.tree.nodes import Tree
+from bbtc.tree.nodes import Status, Tree
 from bbtc.tree.validate import check_tree
 from bbtc.verify.verdict import Engine, Verdict, verify
 
@@ -179,6 +179,59 @@ def task_of_sources(sources: Sequence[SourceFile], report: Report, limits: Limit
     if len(sources) > 1:
         raise BbtcError.single("BBT0006", "a compiled task stands alone", hint="leave the other file out")
     return load_task(sources[0])
+
+
+def import_tree(
+    source: SourceFile,
+    others: Sequence[SourceFile],
+    report: Report,
+    limits: Limits,
+    namespace: str = "",
+) -> Tree:
+    """The tree of an exported BehaviorTree.CPP file or of a tree artefact, by hand edited ones too. Its
+    task is that of ``others``: a domain and a problem, a compiled task, or another tree; without them
+    the one a tree artefact carries. The claimed figures are those of the exact simulation; where the file
+    claimed others, a note says so.
+
+    Raises :class:`BbtcError` with everything that cannot be read, or ``LimitReached``.
+    """
+    from bbtc.artefacts import load_tree
+    from bbtc.artefacts.btcpp_xml import tree_from_btcpp
+    from bbtc.artefacts.kinds import is_xml
+
+    task = _task_for_import(others, report, limits)
+    if not is_xml(source):
+        tree = load_tree(source, task)
+    elif task is None:
+        hint = "give its domain and problem, its compiled task, or the tree it was exported from"
+        raise BbtcError.single("BBT0609", f"{source.name} carries no task", hint=hint)
+    else:
+        tree = tree_from_btcpp(source, task, report, limits, namespace)
+    return _with_figures(tree, source, report, limits)
+
+
+def _task_for_import(others: Sequence[SourceFile], report: Report, limits: Limits) -> Task | None:
+    from bbtc.artefacts import load_tree
+    from bbtc.artefacts.kinds import is_artefact, is_tree
+
+    if not others:
+        return None
+    if len(others) == 1 and is_artefact(others[0]) and is_tree(others[0]):
+        return load_tree(others[0]).task
+    return task_of_sources(others, report, limits)
+
+
+def _with_figures(tree: Tree, source: SourceFile, report: Report, limits: Limits) -> Tree:
+    success = simulate_tree(tree, limits)[0].success
+    if success == tree.success_probability:
+        return tree
+    message = f"{source.name} claims success probability {tree.success_probability}; it is {success}"
+    report.add(Diagnostic("BBT0801", message, severity=Severity.NOTE))
+    if success >= tree.target:
+        status: Status = "target-reached"
+    else:
+        status = "stuck" if tree.status == "target-reached" else tree.status
+    return replace(tree, success_probability=success, status=status)
 
 
 def ground_model(model: Model, report: Report, limits: Limits) -> Task:

@@ -12,6 +12,11 @@ def is_artefact(source: SourceFile) -> bool:
     return source.text.lstrip()[:1] == "{"
 
 
+def is_xml(source: SourceFile) -> bool:
+    """Is this XML? (Neither the language nor JSON begins with an angle bracket.)"""
+    return source.text.lstrip()[:1] == "<"
+
+
 def is_tree(source: SourceFile) -> bool:
     """Does the JSON artefact say that it is a tree?"""
     try:

@@ -6,6 +6,7 @@ Two profiles: ``stock`` writes Skippers as Parallels and keeps latches in Behavi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -22,6 +23,8 @@ SKIPPER, LATCH = "Skipper", "Latch"
 
 SKIPPER_LABEL = "skipper"
 """The name that a Parallel gets where the Skipper has none."""
+
+_RETRY_LABEL = re.compile("at most [0-9]+ attempts?")
 
 BLOCKED_LABEL = "until blocked"
 WHEN_READY_LABEL = "start when ready"
@@ -160,6 +163,11 @@ class Idioms:
         answer = Element("Precondition", {"if": "_value != 'unknown'", "else": "RUNNING"})
         SubElement(answer, "ScriptCondition", code="_value == 'true'")
         return self.control("sequence", [read, answer])
+
+
+def is_retry_label(text: str) -> bool:
+    """Whether a name is the one that :meth:`Idioms.retry` gives."""
+    return _RETRY_LABEL.fullmatch(text) is not None
 
 
 def decorated(decorator: str, child: Element) -> Element:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from bbtc.export.btcpp_idioms import LATCH, SKIPPER
 from bbtc.export.interface import Interface, interface_of
-from bbtc.export.names import Namer, Symbol, camel, identifiers, parameter_names, port_values, printable
+from bbtc.export.names import Namer, Symbol, camel, identifiers, port_values, printable
 from bbtc.ground.task import Task
 from bbtc.tree.nodes import Tree
 
@@ -84,9 +84,12 @@ def ports_for(uses: Iterable[tuple[str, str]]) -> dict[str, str]:
         if not is_numeric(arg):
             first.setdefault(arg, parameter)
     # Parameters of one name, of two predicates: the first keeps it.
-    taken = Namer()
-    wanted = [taken.take(parameter, seed=arg) for arg, parameter in first.items()]
-    return dict(zip(first, parameter_names(wanted), strict=True))
+    taken: set[str] = set()
+    for arg, parameter in first.items():
+        free = (f"{parameter}{suffix}" for suffix in ("", *(f"_{i}" for i in range(2, len(first) + 2))))
+        first[arg] = next(name for name in free if name not in taken)
+        taken.add(first[arg])
+    return first
 
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]|\.[0-9]|inf|nan)", re.IGNORECASE)

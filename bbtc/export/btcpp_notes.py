@@ -5,20 +5,23 @@ tells what nodes of BehaviorTree.CPP have no place for: the ids of our nodes, th
 the labels and conditions that the file shows in another form. What no longer fits the file, because
 it was edited, does not count.
 
-It is JSON: ``ids`` in the order of the file, SubTrees in place, with a letter for the kind of each node
-in ``kinds``; ``nodes`` with what a node cannot show, by id; ``symbols`` with the predicate or action
-behind each id; ``objects`` with the names behind values of ports, where they differ.
+It is JSON: ``ids`` in the order of the file, SubTrees in place, with the kind of each node in ``kinds``,
+which shows where the file was edited; ``nodes`` with what a node cannot show, by id; ``symbols`` with
+the predicate or action behind each id; ``objects`` with the names behind values of ports, where they
+differ.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 import textwrap
 from collections.abc import Mapping
 
 from typing_extensions import assert_never
 
-from bbtc.export.btcpp_idioms import SKIPPER_LABEL
+from bbtc.export.btcpp_idioms import SKIPPER_LABEL, is_retry_label
 from bbtc.export.btcpp_names import BtcppNames, shown, without_number
 from bbtc.export.shape import words_of, written
 from bbtc.ground.condition import TRUE
@@ -50,7 +53,7 @@ def notes(tree: Tree, root: Node, names: BtcppNames) -> str:
         content["bounds"] = [str(bound) for bound in tree.bounds]
     if names.namespace:
         content["namespace"] = names.namespace
-    content["kinds"] = "".join(map(kind_letter, walk(root)))
+    content["kinds"] = "".join(kind_of(tree.task, node) for node in walk(root))
     content["ids"] = [node.id for node in walk(root)]
     exact = {node.id: found for node in walk(root) if (found := _exact(tree.task, node))}
     if exact:
@@ -64,17 +67,25 @@ def notes(tree: Tree, root: Node, names: BtcppNames) -> str:
     return "\n".join([MARK, *_lines(content), "  "])
 
 
-def kind_letter(node: Node) -> str:
-    """The letter for the kind of a node."""
+def kind_of(task: Task, node: Node) -> str:
+    """A letter for the kind of a node, and for a leaf three digits that tell it from most others."""
     match node:
         case ControlNode(kind=kind):
             return {"sequence": "S", "fallback": "F", "skipper": "K", "retry": "R"}[kind]
         case ConditionNode():
-            return "c"
+            return f"c{_digits(words_of(task, written(task, node.condition)).full)}"
         case ActionNode():
-            return "a"
+            return f"a{_digits(node.action)}"
         case _:
             assert_never(node)
+
+
+KIND = re.compile("[SFKR]|[ca][0-9a-f]{3}")
+"""What :func:`kind_of` makes."""
+
+
+def _digits(text: str) -> str:
+    return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:3]
 
 
 def template_label(template: str) -> str:
@@ -111,7 +122,12 @@ def _exact(task: Task, node: Node) -> dict[str, object]:
 
 
 def _reads_back(name: str, default: str | None) -> bool:
-    return bool(name) and without_number(shown(name)) == name and name != default
+    return (
+        bool(name)
+        and without_number(shown(name)) == name
+        and name != default
+        and not (default is None and is_retry_label(name))
+    )
 
 
 def _lines(content: Mapping[str, object]) -> list[str]:

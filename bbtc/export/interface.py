@@ -73,12 +73,13 @@ def interface_of(task: Task, root: Node) -> Interface:
         symbol = variable_symbol(variable)
         unknowable[symbol] = unknowable.get(symbol, False) or variable.three_valued
     return Interface(
-        tuple(Leaf(s, _parameters(task, s), unknowable[s]) for s in sorted(unknowable)),
-        tuple(Leaf(s, _parameters(task, s)) for s in sorted(actions)),
+        tuple(Leaf(s, parameters_of(task, s), unknowable[s]) for s in sorted(unknowable)),
+        tuple(Leaf(s, parameters_of(task, s)) for s in sorted(actions)),
     )
 
 
-def _parameters(task: Task, symbol: Symbol) -> tuple[str, ...]:
+def parameters_of(task: Task, symbol: Symbol) -> tuple[str, ...]:
+    """The parameter names of a leaf: those that the domain declares, or else ``arg``, ``arg1``, …."""
     for signature in task.signatures:
         if (signature.kind, signature.symbol, len(signature.parameters)) == (
             symbol.kind,

@@ -70,6 +70,12 @@ def identifiers(symbols: Iterable[Symbol], style: Style, reserved: Collection[st
     }
 
 
+def possible_identifiers(symbol: Symbol, style: Style) -> tuple[str, ...]:
+    """The identifiers that :func:`identifiers` gives a symbol, whatever stands beside it, the usual one
+    first. (Where even the last is taken, it gets a longer digest.)"""
+    return _candidates(symbol, style)
+
+
 def parameter_names(names: Sequence[str]) -> tuple[str, ...]:
     """Snake-case identifiers for the parameters of one symbol: ports and Python arguments."""
     symbols = [Symbol("parameter", name, 0) for name in names]

@@ -1,0 +1,48 @@
+"""``bbtc import``: an exported tree, edited by hand or not, as a tree again."""
+
+from __future__ import annotations
+
+import click
+
+from bbtc.cli.session import Session, limit_options, output_options
+from bbtc.cli.session import command as session_command
+from bbtc.files import write, write_depfile, write_files
+
+
+@click.command("import")
+@click.argument("file", metavar="FILE")
+@click.argument("others", nargs=-1, metavar="[DOMAIN PROBLEM | TASK | TREE]")
+@click.option(
+    "--to", "form", default="json", show_default=True, metavar="FORMAT", help="What to write; see export."
+)
+@click.option("--namespace", default="", help="That of the ids in FILE, if its notes do not tell.")
+@limit_options
+@output_options
+@session_command
+def command(
+    session: Session,
+    file: str,
+    others: tuple[str, ...],
+    form: str,
+    namespace: str,
+    output: str,
+    check: bool,
+    depfile: str | None,
+) -> None:
+    """Read FILE, which `bbtc export` wrote as btcpp or json and a person may have edited, and write the
+    tree with its figures computed anew. BehaviorTree.CPP files need the task that they are about: a
+    DOMAIN and PROBLEM, a compiled TASK, or the TREE that was exported."""
+    from bbtc.export.registry import Files, load_exporter
+    from bbtc.pipeline import export_tree, import_tree
+
+    if not load_exporter(form).suffix and output == "-":
+        raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
+    sources = [session.read(path) for path in (file, *others)]
+    tree = import_tree(sources[0], sources[1:], session.report, session.limits, namespace)
+    artefact = export_tree(tree, form, {}, session.limits)
+    if isinstance(artefact, Files):
+        write_files(output, artefact.texts, check=check)
+    else:
+        write(output, artefact, check=check)
+    if depfile is not None:
+        write_depfile(depfile, output, session.inputs)

@@ -1,0 +1,139 @@
+"""What is exported is read back as the very same tree: XML of both profiles, and JSON."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from bbtc.artefacts import dumps, load_tree, tree_to_json
+from bbtc.artefacts.btcpp_xml import tree_from_btcpp
+from bbtc.diagnostics import BbtcError, Report
+from bbtc.export.btcpp import btcpp
+from bbtc.export.shape import written
+from bbtc.ground.condition import TRUE
+from bbtc.ground.task import Task
+from bbtc.source import SourceFile
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+from bbtc.tree.validate import check_tree
+from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.export.test_btcpp import nested
+from tests.replay.random_trees import random_tree
+from tests.strategies import HOSTILE_NAMES, trees
+
+OPTIONS = [{"nodes": "stock"}, {"nodes": "bbtc"}, {"nodes": "bbtc", "namespace": "my-robot"}]
+
+
+def exported(tree: Tree, **options: str | bool) -> str:
+    return btcpp.export(tree, options, None)
+
+
+def read(text: str, task: Task, namespace: str = "") -> Tree:
+    report = Report()
+    tree = tree_from_btcpp(SourceFile("tree.xml", text), task, report, namespace=namespace)
+    assert not list(report)
+    return tree
+
+
+def is_sound(tree: Tree) -> bool:
+    try:
+        check_tree(tree)
+    except BbtcError:
+        return False
+    return True
+
+
+def without_ids(tree: Tree) -> Node:
+    """What a file without notes shows of a tree: no ids, and conditions as they are written."""
+
+    def plain(node: Node) -> Node:
+        node = replace(node, id="")
+        if isinstance(node, ControlNode):
+            return replace(node, children=tuple(plain(child) for child in node.children))
+        if isinstance(node, ConditionNode):
+            return replace(node, condition=written(tree.task, node.condition))
+        # A precondition that is always true leaves no trace.
+        trace = written(tree.task, tree.task.action_by_name[node.action].precondition)
+        return replace(node, guarded=node.guarded and trace != TRUE)
+
+    return plain(tree.root)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_the_tree_of_every_problem_comes_back(problem: Problem) -> None:
+    tree = plan_of(problem).tree
+    for options in OPTIONS:
+        assert read(exported(tree, **options), tree.task) == tree
+    assert load_tree(SourceFile("tree.json", dumps(tree_to_json(tree))), tree.task) == tree
+
+
+def test_random_trees_come_back() -> None:
+    found = seed = 0
+    while found < 300:
+        seed += 1
+        tree = random_tree(seed, latched=0.7)
+        if not is_sound(tree):
+            continue
+        found += 1
+        tree = replace(tree, bounds=(Fraction(1, 3), Fraction(1, 2)) if seed % 2 else None)
+        for options in OPTIONS:
+            assert read(exported(tree, **options), tree.task) == tree, seed
+
+
+def test_without_notes_all_but_ids_and_claims_comes_back() -> None:
+    found = seed = 0
+    while found < 150:
+        seed += 1
+        tree = random_tree(seed, latched=0.7)
+        if not is_sound(tree):
+            continue
+        found += 1
+        for options in OPTIONS:
+            text = exported(tree, notes=False, **options)
+            back = read(text, tree.task, options.get("namespace", ""))
+            assert without_ids(back) == without_ids(tree), seed
+            ids = [node.id for node in walk(back.root)]
+            assert ids == [f"n{number + 1}" for number in range(len(ids))]
+
+
+@settings(deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+@given(trees(HOSTILE_NAMES))
+def test_hostile_names_and_labels_come_back(tree: Tree) -> None:
+    if not is_sound(tree):
+        return
+    for options in OPTIONS:
+        assert read(exported(tree, **options), tree.task) == tree
+
+
+def flat(tree: Tree) -> list[tuple[Node, int]]:
+    """The nodes without their children, each with their number; equality of deep trees is too deep."""
+    nodes: list[tuple[Node, int]] = []
+    for node in walk(tree.root):
+        if isinstance(node, ControlNode):
+            nodes.append((replace(node, children=()), len(node.children)))
+        else:
+            nodes.append((node, 0))
+    return nodes
+
+
+def test_the_deepest_tree_comes_back() -> None:
+    tree = nested(249, ("sequence", "fallback", "skipper"))
+    assert flat(read(exported(tree), tree.task)) == flat(tree)
+    labelled: Node = tree.root
+    chain: list[ControlNode] = []
+    while isinstance(labelled, ControlNode):
+        chain.append(labelled)
+        (labelled,) = labelled.children
+    for number, node in enumerate(reversed(chain)):
+        labelled = replace(node, children=(labelled,), template=f"t{number}()")
+    tree = replace(tree, root=labelled)
+    for options in OPTIONS:
+        assert flat(read(exported(tree, **options), tree.task)) == flat(tree)
+
+
+def test_the_random_trees_have_every_kind_of_action() -> None:
+    actions = [node for seed in range(1, 200) for node in walk(random_tree(seed, latched=0.7).root)]
+    kinds = {(node.latched, node.guarded) for node in actions if isinstance(node, ActionNode)}
+    assert len(kinds) == 4
