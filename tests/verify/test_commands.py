@@ -17,26 +17,32 @@ from bbtc.limits import Limits
 from bbtc.tree.nodes import Tree
 from bbtc.verify import storm, verdict
 from bbtc.verify.prism import KEYWORDS
-from tests.conftest import GOLDEN
 from tests.domains.problems import REPOSITORY, bbtc
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
-TREE = GOLDEN / "household" / "look-for-soda" / "tree.json"
 FILES = ("domains/household/domain.pddl", "domains/household/look-for-soda.pddl")
 
 
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The paper's tree for the household."""
+    file = tmp_path_factory.mktemp("planned") / "tree.json"
+    assert bbtc("plan", *FILES, "--strategy", "refine", "-q", "-o", str(file)).status == 0
+    return file
+
+
 @pytest.fixture
-def forged(tmp_path: Path) -> Path:
+def forged(planned: Path, tmp_path: Path) -> Path:
     """A tree that claims too much."""
-    data = json.loads(TREE.read_text(encoding="utf-8"))
+    data = json.loads(planned.read_text(encoding="utf-8"))
     data["success_probability"] = "63/64"
     file = tmp_path / "forged.json"
     file.write_text(json.dumps(data), encoding="utf-8")
     return file
 
 
-def test_a_true_claim_is_verified() -> None:
-    done = bbtc("verify", str(TREE), "--engine", "own")
+def test_a_true_claim_is_verified(planned: Path) -> None:
+    done = bbtc("verify", str(planned), "--engine", "own")
     assert (done.status, done.err) == (0, "")
     assert done.out.decode().splitlines()[-1] == "verified"
 
@@ -48,8 +54,8 @@ def test_a_forged_claim_is_refused(forged: Path) -> None:
     assert done.out.decode().splitlines()[-1] == "refused"
 
 
-def test_the_report_for_machines(forged: Path) -> None:
-    found = json.loads(bbtc("verify", str(TREE), "--engine", "own", "--json").out)
+def test_the_report_for_machines(planned: Path, forged: Path) -> None:
+    found = json.loads(bbtc("verify", str(planned), "--engine", "own", "--json").out)
     assert (found["format"], found["claimed"], found["verified"]) == ("bbtc-verdict", "31/32", True)
     assert (found["own"]["success"], found["own"]["cost"], found["storm"]) == ("31/32", "31/8", None)
     found = json.loads(bbtc("verify", str(forged), "--engine", "own", "--json").out)
@@ -61,8 +67,8 @@ def test_diagnostics_for_machines(forged: Path) -> None:
     assert [one["code"] for one in json.loads(done.err)] == ["BBT0801"]
 
 
-def test_limits_end_it_with_their_status() -> None:
-    assert bbtc("verify", str(TREE), "--engine", "own", "--max-states", "3").status == 3
+def test_limits_end_it_with_their_status(planned: Path) -> None:
+    assert bbtc("verify", str(planned), "--engine", "own", "--max-states", "3").status == 3
 
 
 def test_nothing_is_exported_from_a_forged_tree(forged: Path, tmp_path: Path) -> None:
@@ -73,13 +79,13 @@ def test_nothing_is_exported_from_a_forged_tree(forged: Path, tmp_path: Path) ->
 
 
 def test_a_verified_plan_is_written_and_a_wrong_one_is_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    planned: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "tree.json"
-    done = bbtc("plan", *FILES, "-q", "--verify", "-o", str(out))
+    done = bbtc("plan", *FILES, "--strategy", "refine", "-q", "--verify", "-o", str(out))
     assert done.status == 0
     assert "verified by our own solver" in done.err
-    assert out.read_bytes() == TREE.read_bytes()
+    assert out.read_bytes() == planned.read_bytes()
     out.unlink()
     honest = verdict.verify
 
@@ -87,7 +93,7 @@ def test_a_verified_plan_is_written_and_a_wrong_one_is_not(
         return honest(replace(tree, success_probability=tree.success_probability / 2), limits, engine)
 
     monkeypatch.setattr("bbtc.pipeline.verify", other)
-    done = bbtc("plan", *FILES, "-q", "--verify", "-o", str(out))
+    done = bbtc("plan", *FILES, "--strategy", "refine", "-q", "--verify", "-o", str(out))
     assert done.status == 1
     assert not out.exists()
 

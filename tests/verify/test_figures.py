@@ -159,8 +159,8 @@ def test_trees_that_are_not_sound_are_refused() -> None:
 
 
 def test_limits_end_the_recomputation() -> None:
-    tree = golden_tree(GOLDEN / "household" / "look-for-soda" / "tree.json")
+    tree = soda_tree()
     with pytest.raises(LimitReached, match="states"):
-        verify(tree, Limits(states=3), "own")
+        verify(tree, Limits(states=2), "own")
     with pytest.raises(LimitReached, match="time"):
         verify(tree, Limits(seconds=0.0), "own")

@@ -1,0 +1,77 @@
+"""Trees that were planned, by every strategy, on random tasks and on the shared cases, are verified."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import get_args
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bbtc.diagnostics import LimitReached
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.pipeline import plan_task
+from bbtc.plan.options import Options, Retries
+from bbtc.plan.strategies import STRATEGIES
+from bbtc.tree.nodes import Tree
+from bbtc.verify import storm, storm_worker
+from bbtc.verify.chain import chain_of
+from bbtc.verify.naming import numbered
+from bbtc.verify.prism import prism_text
+from bbtc.verify.verdict import verify
+from tests.plan.examples import Optimum, cases
+from tests.strategies import tasks
+from tests.verify.test_figures import LONG, disagreements
+
+RETRIES: tuple[Retries, ...] = get_args(Retries)
+WITH_STORM = storm.is_installed()
+
+
+def check(tree: Tree) -> None:
+    """Our own solver finds the claim exactly, and all figures of the simulator; so does Storm."""
+    verdict = verify(tree, Limits(), "own")
+    assert verdict.problems == ()
+    assert verdict.own is not None
+    assert disagreements(tree, verdict.own) == {}
+    if WITH_STORM:
+        program = chain_of(tree.task, tree.root)
+        question = {"program": prism_text(program, numbered(program)), "properties": ['P=? [F "success"]']}
+        ((low, _),) = storm_worker.answer(question)["values"]
+        assert Fraction(low) == tree.success_probability
+
+
+@settings(max_examples=2000 if LONG else 120, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    task=tasks(),
+    strategy=st.sampled_from(list(STRATEGIES)),
+    retries=st.sampled_from(RETRIES),
+    most=st.sampled_from([None, None, 0, 1, 4]),
+)
+def test_plans_for_random_tasks(task: Task, strategy: str, retries: Retries, most: int | None) -> None:
+    budget = most if strategy in {"policy", "auto"} else None
+    options = Options(max_actions=budget, retries=retries)
+    limits = Limits(seconds=20, states=20_000, nodes=500)
+    try:
+        plan = plan_task(task, None, strategy, limits, lambda _: None, options=options)
+    except LimitReached:
+        return
+    check(plan.tree)
+
+
+@pytest.mark.parametrize("retries", RETRIES)
+@pytest.mark.parametrize("strategy", list(STRATEGIES))
+@pytest.mark.parametrize("case", cases(), ids=lambda c: c.name)
+def test_plans_for_the_shared_cases(case: Optimum, strategy: str, retries: Retries) -> None:
+    limits = Limits(seconds=60)
+    plan = plan_task(case.task(), None, strategy, limits, lambda _: None, options=Options(retries=retries))
+    check(plan.tree)
+
+
+@pytest.mark.parametrize("budget", [1, 3, 8])
+@pytest.mark.parametrize("case", cases(), ids=lambda c: c.name)
+def test_plans_within_a_budget(case: Optimum, budget: int) -> None:
+    options = Options(max_actions=budget)
+    plan = plan_task(case.task(), None, "policy", Limits(seconds=60), lambda _: None, options=options)
+    check(plan.tree)
