@@ -17,6 +17,9 @@ class Truth(enum.IntEnum):
     UNKNOWN = 1
     TRUE = 2
 
+    # That of the number it equals, as it must be; enumerations hash their names, in Python.
+    __hash__ = int.__hash__
+
     @property
     def word(self) -> str:
         """The value as written in the language and in artefacts: ``true``, ``false``, ``unknown``."""

@@ -14,6 +14,8 @@ from bbtc.kleene import Truth
 _VALUES = (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN)
 
 Leaves = dict[Row, Condition]
+Pair = tuple[int, Truth]
+"""A variable and the value that it is set to."""
 
 
 class Atoms:
@@ -42,7 +44,7 @@ class Atoms:
         self._is: dict[Truth, list[Is]] = {}
 
     @cached_property
-    def pairs(self) -> dict[Truth, list[tuple[int, Truth]]]:
+    def pairs(self) -> dict[Truth, list[Pair]]:
         """For each value and variable, the pair that effects hold."""
         return {value: [(number, value) for number in range(len(self.keys))] for value in _VALUES}
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from bbtc.ground.universe import Row
@@ -59,12 +59,12 @@ def _in_process(program: Sequence[str], outputs: Mapping[str, int]) -> dict[str,
 
 # The child sees the packages that we see, and nothing from the folder it starts in.
 _CHILD = """
-import json, sys
-program, memory, sys.path[:] = sys.argv[1], int(sys.argv[2]), json.loads(sys.argv[3])
-if memory:
+import sys
+program, memory, *sys.path[:] = sys.argv[1:]
+if int(memory):
     try:
         import resource
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+        resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
     except (ImportError, ValueError, OSError):
         pass
 from clingo.application import Application, clingo_main
@@ -79,8 +79,7 @@ def _in_child(
     with tempfile.TemporaryDirectory(prefix="bbtc-") as folder:
         path = Path(folder, "program.lp")
         path.write_text("\n".join(program), encoding="ascii")
-        arguments = [str(path), str(limits.memory or 0), json.dumps(sys.path)]
-        command = [sys.executable, "-I", "-c", _CHILD, *arguments]
+        command = [sys.executable, "-I", "-S", "-c", _CHILD, str(path), str(limits.memory or 0), *sys.path]
         # Our own interpreter and our own program text: nothing of the input is a command.
         process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -100,7 +99,8 @@ def _in_child(
         return rows
     limits.check_time("grounding")
     if process.returncode < 0 or process.returncode == _OUT_OF_MEMORY:
-        raise limits.reached("the memory limit ended grounding", "--max-memory")
+        bound = f"the limit of {(limits.memory or 0) >> 20} MiB of memory ended grounding"
+        raise limits.reached(bound, "--max-memory")
     raise RuntimeError(f"the Datalog engine failed with status {process.returncode}")
 
 
@@ -112,32 +112,59 @@ def _collect(
 ) -> dict[str, list[Row]]:
     assert process.stdout is not None
     rows: dict[str, list[Row]] = {name: [] for name in outputs}
+    wanted = {name.encode(): (rows[name], arity) for name, arity in outputs.items()}
     facts = 0
     for lines in _blocks(process.stdout.fileno()):
         facts += len(lines)
         limits.check_facts(facts)
-        # A fact reads `name(1,2).` or `name.`.
-        batch: dict[bytes, list[bytes]] = {name.encode(): [] for name in outputs}
-        for line in lines:
-            name, _, args = line.partition(b"(")
-            if name in batch:
-                batch[name].append(args)
-            elif name[-1:] == b"." and name[:-1].decode() in rows:
-                rows[name[:-1].decode()].append(())
-        for name, found in batch.items():
-            if found:
-                # The JSON reader turns many numbers at once into integers.
-                listed = b"],[".join(found).replace(b").", b"")
-                rows[name.decode()].extend(map(tuple, json.loads(b"[[%b]]" % listed)))
+        for name, run in _runs(lines):
+            found = wanted.get(name)
+            if found is not None:
+                into, arity = found
+                into += _read(run, len(name), arity)
         limits.check_actions(sum(len(rows[name]) for name in counted))
     return rows
 
 
+def _runs(lines: list[bytes]) -> Iterator[tuple[bytes, list[bytes]]]:
+    """Facts of one predicate that stand together. They come in long runs, whose ends are searched for
+    in steps that double."""
+    start, size = 0, len(lines)
+    while start < size:
+        name = lines[start].rstrip(b".").partition(b"(")[0]
+        prefixes = (name + b"(", name + b".")
+        step = 1
+        end = start + 1
+        while end < size and all(line.startswith(prefixes) for line in lines[end : end + step]):
+            end += step
+            step *= 2
+        end = min(end, size)
+        while end < size and lines[end].startswith(prefixes):
+            end += 1
+        yield name, lines[start:end]
+        start = end
+
+
+def _read(facts: list[bytes], skip: int, arity: int) -> Iterable[Row]:
+    """The arguments of facts ``name(1,2).`` or ``name.`` whose name has ``skip`` letters."""
+    if not arity:
+        return [()] * len(facts)
+    # The JSON reader turns many numbers at once into integers.
+    numbers = json.loads(b"[%b]" % b",".join([fact[skip + 1 : -2] for fact in facts]))
+    return zip(*(numbers[place::arity] for place in range(arity)), strict=True)
+
+
 def _blocks(descriptor: int) -> Iterator[list[bytes]]:
     """Whole lines, as they come, many at a time."""
-    rest = b""
+    pieces: list[bytes] = []
+    size = 0
     while chunk := os.read(descriptor, _CHUNK):
-        lines = (rest + chunk).split(b"\n")
-        rest = lines.pop()
-        yield lines
+        pieces.append(chunk)
+        size += len(chunk)
+        if size >= _CHUNK:
+            lines = b"".join(pieces).split(b"\n")
+            rest = lines.pop()
+            pieces, size = [rest], len(rest)
+            yield lines
     # A line without its end was cut off by a limit.
+    yield b"".join(pieces).split(b"\n")[:-1]

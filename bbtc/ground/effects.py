@@ -5,27 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from itertools import pairwise, repeat
-from operator import lt
-from typing import cast
+from itertools import repeat
 
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
 from bbtc.ground.atoms import Atoms
-from bbtc.ground.bulk import Shared, instances
+from bbtc.ground.bulk import Shared
 from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
-from bbtc.ground.normal import Block, Chance, Item, free, reads
-from bbtc.ground.task import Effect, Factor, Outcome
+from bbtc.ground.normal import Block, Chance, free, reads
+from bbtc.ground.settings import Numbers, Settings, certain, drawn
+from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
-
-ZERO = Fraction(0)
-ONE = Fraction(1)
 
 
 @dataclass(slots=True)
@@ -136,39 +132,48 @@ class LoweredEffect:
     """A compiled block."""
 
     def __init__(self, owner: EffectLowering, block: Block, frame: Frame) -> None:
-        self._owner = owner
         self._frame = frame
-        self._pairs = owner.atoms.pairs
-        self._plain: list[_Plain] = []
         self._costs: list[_Addition] = []
         self._items: list[tuple[_Loop, _Leaf]] = []
+        lowering = owner.lowering
+        always: list[me.Set] = []
         for item in block.items:
-            self._add(item, frame)
+            loop = _Loop(lowering, frame, item.parameters, item.guard)
+            match item.leaf:
+                case me.Set() as leaf if loop.trivial:
+                    always.append(leaf)
+                case me.Set(predicate, args, value):
+                    self._items.append((loop, _Setting(lowering.number(predicate, args, frame), value)))
+                case me.Add(to="cost") as leaf if loop.trivial:
+                    self._costs.append(_Addition(owner, leaf, frame))
+                case me.Add() as leaf:
+                    self._items.append((loop, _Addition(owner, leaf, frame)))
+                case _:
+                    assert_never(item.leaf)
+        self._always = Settings(lowering, always, frame)
         self._chances = [_LoweredChance(owner, chance, frame) for chance in block.chances]
+        self._draw = (
+            None if self._items or len(block.chances) != 1 else self._plain_draw(owner, block, always)
+        )
 
-    def _add(self, item: Item, frame: Frame) -> None:
-        loop = _Loop(self._owner.lowering, frame, item.parameters, item.guard)
-        leaf = item.leaf
-        if isinstance(leaf, me.Add):
-            addition = _Addition(self._owner, leaf, frame)
-            if loop.trivial and leaf.to == "cost":
-                self._costs.append(addition)
-            else:
-                self._items.append((loop, addition))
-            return
-        number = self._owner.lowering.number(leaf.predicate, leaf.args, frame)
-        if not loop.trivial:
-            self._items.append((loop, _Setting(number, leaf.value)))
-        elif self._owner.atoms.numbers[leaf.predicate]:
-            numbers = self._owner.lowering.numbers(leaf.predicate, leaf.args, frame)
-            self._plain.append(_Plain(leaf.predicate, number, numbers, leaf.value))
-            # Variables are numbered predicate by predicate: in this order most are sorted already.
-            self._plain.sort(key=lambda plain: f"{plain.predicate}(")
+    def _plain_draw(self, owner: EffectLowering, block: Block, always: list[me.Set]) -> _Draw | None:
+        """The only chance, if its branches do nothing but set variables."""
+        (chance,) = block.chances
+        if chance.parameters or chance.guard:
+            return None
+        branches = []
+        for probability, branch in chance.branches:
+            leaves = [item.leaf for item in branch.items if not item.parameters and not item.guard]
+            sets = [leaf for leaf in leaves if isinstance(leaf, me.Set)]
+            if branch.chances or len(sets) < len(branch.items):
+                return None
+            branches.append((probability, Settings(owner.lowering, [*always, *sets], self._frame)))
+        return _Draw(branches, chance.oneof)
 
     @property
-    def _is_plain(self) -> bool:
-        """Whether there is no chance, and nothing under a condition."""
-        return not self._items and not self._chances
+    def plain(self) -> list[Numbers] | None:
+        """The variables set by an effect without chance, quantifiers and guards; None for others."""
+        return None if self._items or self._chances else self._always.columns()
 
     def factors(self, env: Env) -> tuple[tuple[Factor, ...], Fraction]:
         """Independent factors, and the cost that is certain.
@@ -176,18 +181,22 @@ class LoweredEffect:
         What is certain joins the outcomes of a single factor; beside several it is a factor of its
         own with probability 1.
         """
-        if self._is_plain:
-            numbers = [plain.number(env) for plain in self._plain]
-            return _certain([self._pairs_of(numbers)])[0], self._cost(env)
         part = self.part(env, [])
         cost, part.cost = part.cost, ZERO
         return _arranged(part), cost
 
     def all(self, rows: list[Row]) -> list[tuple[tuple[Factor, ...], Fraction]]:
         """:meth:`factors` of many argument rows."""
-        if not self._is_plain:
+        if self._items or (self._chances and self._draw is None):
             return [self.factors(self._frame.env(row)) for row in rows]
-        made = _certain(self._all_pairs(rows))
+        if self._draw is None:
+            made = certain(self._always.all(rows))
+        else:
+            sets = [(probability, settings.all(rows)) for probability, settings in self._draw.branches]
+            made = [
+                self.factors(self._frame.env(row))[0] if factors is None else factors
+                for row, factors in zip(rows, drawn(sets, oneof=self._draw.oneof), strict=True)
+            ]
         costs = [self._cost(self._frame.env(row)) for row in rows] if self._costs else repeat(ZERO, len(rows))
         return list(zip(made, costs, strict=True))
 
@@ -195,54 +204,10 @@ class LoweredEffect:
         amounts = [each.amount(env) for each in self._costs]
         return amounts[0] if len(amounts) == 1 else sum(amounts, ZERO)
 
-    def _all_pairs(self, rows: list[Row]) -> list[tuple[tuple[int, Truth], ...]]:
-        """What the settings of each row come to."""
-        if not self._plain:
-            return [()] * len(rows)
-        columns = [plain.numbers(rows) for plain in self._plain]
-        if any(None in column for column in columns):
-            return list(map(self._pairs_of, zip(*columns, strict=True)))
-        # No variable is None from here on.
-        known = cast("list[list[int]]", columns)
-        pairs = zip(
-            *(
-                map(self._pairs[plain.value].__getitem__, numbers)
-                for plain, numbers in zip(self._plain, known, strict=True)
-            ),
-            strict=True,
-        )
-        if all(all(map(lt, one, other)) for one, other in pairwise(known)):
-            return list(pairs)
-        made = list(map(tuple, map(sorted, pairs)))
-        for index, numbers in enumerate(zip(*columns, strict=True)):
-            if len({*numbers}) < len(numbers):
-                made[index] = self._pairs_of(numbers)
-        return made
-
-    def _pairs_of(self, numbers: Sequence[int | None]) -> tuple[tuple[int, Truth], ...]:
-        """What the settings of these variables (None: one that never changes) come to."""
-        sets = self._merged(numbers)
-        return tuple([self._pairs[sets[number]][number] for number in sorted(sets)])
-
-    def _merged(self, numbers: Iterable[int | None]) -> dict[int, Truth]:
-        sets: dict[int, Truth] = {}
-        for number, plain in zip(numbers, self._plain, strict=True):
-            # Where one occurrence sets a variable twice, the Kleene maximum wins.
-            if number is not None and sets.get(number, -1) < plain.value:
-                sets[number] = plain.value
-        return sets
-
-    @property
-    def plain(self) -> list[_Numbers] | None:
-        """The variables set by an effect without chance, quantifiers and guards; None for others."""
-        return [plain.numbers for plain in self._plain] if self._is_plain else None
-
     def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
         """Every variable that may be set, with the conditions under which it is."""
-        for plain in self._plain:
-            number = plain.number(env)
-            if number is not None:
-                yield number, above
+        for always in self._always.numbers(env):
+            yield always, above
         for loop, leaf in self._items:
             if isinstance(leaf, _Setting):
                 for conditions in loop.guards(env, above):
@@ -257,7 +222,7 @@ class LoweredEffect:
         part = _Part()
         for addition in self._costs:
             addition.run(part, env, conjoin(above))
-        sets = self._merged([plain.number(env) for plain in self._plain])
+        sets = self._always.values(env)
         if sets:
             part.sets[conjoin(above)] = sets
         for loop, leaf in self._items:
@@ -272,17 +237,12 @@ class LoweredEffect:
         return part
 
 
-_Numbers = Callable[[list[Row]], "list[int | None]"]
-
-
 @dataclass(frozen=True, slots=True)
-class _Plain:
-    """An unconditional setting: the variable in an environment and in many rows, and its value."""
+class _Draw:
+    """A chance whose branches only set variables: what each sets, with what is certain."""
 
-    predicate: str
-    number: Callable[[Env], int | None]
-    numbers: _Numbers
-    value: Truth
+    branches: list[tuple[Fraction, Settings]]
+    oneof: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -416,15 +376,6 @@ class _Amounts:
 
 
 # --- putting together ----------------------------------------------------------------------------
-
-
-def _certain(sets: list[tuple[tuple[int, Truth], ...]]) -> list[tuple[Factor, ...]]:
-    """For each the factor that certainly sets these variables; none where nothing is set."""
-    size, zeros = len(sets), repeat(ZERO)
-    effects = instances(Effect, size, repeat(None), sets)
-    outcomes = instances(Outcome, size, repeat(ONE), zip(effects), repeat(()), zeros, zeros)
-    factors: list[tuple[Factor, ...]] = list(zip(instances(Factor, size, zip(outcomes), repeat(False))))
-    return factors if all(sets) else [made if each else () for made, each in zip(factors, sets, strict=True)]
 
 
 def _put(sets: dict[int, Truth], number: int, value: Truth) -> None:

@@ -211,7 +211,9 @@ class Task:
         return {template.name: template for template in self.templates}
 
 
-NO_CHANGE = Factor((Outcome(Fraction(1), ()),))
+ZERO = Fraction(0)
+ONE = Fraction(1)
+NO_CHANGE = Factor((Outcome(ONE, ()),))
 
 
 def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:

@@ -181,7 +181,7 @@ def test_a_quantified_goal_over_a_thousand_objects_meets_the_limit() -> None:
 
 
 def test_memory_is_bounded() -> None:
-    with pytest.raises(LimitReached, match="memory limit"):
+    with pytest.raises(LimitReached, match="of memory ended grounding"):
         task_of(_wide(12, 1000).replace("{goal}", "(p)"), Limits(memory=160_000_000))
 
 
