@@ -58,10 +58,6 @@ class Limits:
         """The same bounds, with the time counted from now."""
         return replace(self, _start=time.monotonic())
 
-    def afresh(self) -> Limits:
-        """The same bounds, with the time counted from now."""
-        return replace(self, _start=time.monotonic())
-
     @property
     def remaining(self) -> float | None:
         """Seconds left, not below 0; None without a bound."""
@@ -74,6 +70,11 @@ class Limits:
         """The same limits for a part of the work that may take a share of the time left."""
         remaining = self.remaining
         return self if remaining is None else replace(self, until=time.monotonic() + share * remaining)
+
+    def within(self, seconds: float) -> Limits:
+        """The same limits for a part of the work that must end after so many seconds at the latest."""
+        until = time.monotonic() + seconds
+        return replace(self, until=until if self.until is None else min(until, self.until))
 
     def tell(
         self, doing: str, states: int | None = None, bounds: tuple[float, float] | None = None

@@ -88,6 +88,7 @@ def command(
         require_verified(session, tree)
     pairs = dict(_pair(option) for option in options)
     artefact = export_tree(tree, form, pairs, limits)
+    session.clear()
     if isinstance(artefact, Files):
         write_files(output, artefact.texts, check=check)
     else:

@@ -98,7 +98,7 @@ def command(
     options = Options(max_actions=max_actions, retries=retries)
     if bounds:
         wanted = task.goal_probability if target is None else target
-        return _print_bounds(task, wanted, limits, options, output, as_json=as_json)
+        return _print_bounds(session, task, wanted, options, output, as_json=as_json)
     plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet)
     if verified:
         require_verified(session, plan.tree)
@@ -109,12 +109,13 @@ def command(
 
 
 def _print_bounds(
-    task: Task, target: Fraction, limits: Limits, options: Options, output: str, *, as_json: bool
+    session: Session, task: Task, target: Fraction, options: Options, output: str, *, as_json: bool
 ) -> int:
     from bbtc.cli.bounds_report import bounds_json, bounds_report
     from bbtc.plan.bounds import task_value
 
-    value = task_value(task, limits, options, costs=True)
+    value = task_value(task, session.limits, options, costs=True)
+    session.clear()
     text = bounds_json(value, target) if as_json else bounds_report(task, value, target)
     write(output, text)
     if value.lower >= target:

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from bbtc.plan.space import StateSpace
     from bbtc.plan.value import Bounds
 
-_EXPLORING = 1 / 2  # of the time, where values come after
-
 
 @dataclass(frozen=True, slots=True)
 class TaskValue:
@@ -48,13 +46,24 @@ def task_value(
 ) -> TaskValue:
     """The value of a task; ``costs`` asks for the least cost, too, which is found where the whole space
     is small enough. With a ``target``, the bounds may stay apart where they tell whether it can be
-    reached. Limits make the bounds wider; only time that is over before anything was found raises
-    ``LimitReached``."""
+    reached. Limits make the bounds wider, up to 0 and 1."""
+    from bbtc.plan.value_best import best_within
+
+    steps = options.max_actions
+    try:
+        if steps is None:
+            return _without_end(task, limits, costs=costs, target=target)
+        within = best_within(task, limits, steps)
+        return _value(within.horizon.space, within.bounds, max_actions=steps, stop=within.stop)
+    except LimitReached as reached:
+        stop = reached.diagnostics[0]
+        return TaskValue(Fraction(0), Fraction(1), 0, 0, 0, max_actions=steps, stop=stop)
+
+
+def _without_end(task: Task, limits: Limits, *, costs: bool, target: Fraction | None) -> TaskValue:
     from bbtc.plan.value_best import best_known
     from bbtc.plan.value_cost import least_cost
 
-    if options.max_actions is not None:
-        return _within(task, limits, options.max_actions)
     best = best_known(task, limits, target)
     cost, stop = None, best.stop
     if costs and best.space.complete:
@@ -69,23 +78,6 @@ def task_value(
         cost_exact=cost is not None and cost.exact,
         stop=stop,
     )
-
-
-def _within(task: Task, limits: Limits, max_actions: int) -> TaskValue:
-    from bbtc.plan.space import explore_space
-    from bbtc.plan.value import Bounds
-    from bbtc.plan.value_horizon import horizon_values
-
-    space = explore_space(task, limits.part(_EXPLORING), max_actions)
-    bounds, stop = Bounds(Fraction(0), Fraction(1)), space.stop
-    try:
-        bounds = horizon_values(space, max_actions, limits).initial[-1]
-        if stop is not None:
-            hope = horizon_values(space, max_actions, limits, space.goal | space.open).initial[-1]
-            bounds = Bounds(bounds.lower, hope.upper)
-    except LimitReached as reached:
-        bounds, stop = Bounds(bounds.lower, Fraction(1)), reached.diagnostics[0]
-    return _value(space, bounds, max_actions=max_actions, stop=stop)
 
 
 def _value(

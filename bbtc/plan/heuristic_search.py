@@ -41,12 +41,13 @@ _SWEEPS = 100  # steps for which runs of the optimistic policy are followed
 @dataclass(frozen=True, slots=True)
 class Searched:
     """What a search found: the part of the space it expanded, solved from below (``lower``; its
-    policy attains the lower bound), and the bounds on P*. ``stop`` says what ended it before the
-    bounds met, if something did."""
+    policy attains the lower bound), and the bounds on P*. ``stop`` says which limit ended it before
+    the bounds met, if one did; ``interrupted`` tells that the user did."""
 
     lower: Reachability
     bounds: Bounds
     stop: Diagnostic | None
+    interrupted: bool = False
 
     @property
     def space(self) -> StateSpace:
@@ -100,6 +101,8 @@ class _Search:
             stop = reached.diagnostics[0]
             if len(solved.space.states) < self.explorer.count:
                 solved = self._solve_late(solved)
+        except KeyboardInterrupt:
+            return Searched(solved.lower, solved.bounds, None, interrupted=True)
         return self._finished(solved, stop)
 
     def _done(self, bounds: Bounds) -> bool:

@@ -6,6 +6,7 @@ least expected cost where that is known; a tree may take whichever makes it smal
 
 from __future__ import annotations
 
+import heapq
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -72,6 +73,33 @@ def best_offers(found: Reachability, limits: Limits) -> tuple[Offers, LeastCost 
         only[policy[policy >= 0]] = True
         offers = offers_of(found.space, only)
     return offers, cheapest
+
+
+def likely_offers(found: Reachability, most: int) -> Offers | None:
+    """The choices of one best policy in the states that its runs visit most probably, ``most`` of them,
+    where there are more; None where there are not. Elsewhere a run ends."""
+    space = found.space
+    chance: dict[int, float] = {}
+    heap = [(-float(p), state) for p, state in space.initial]
+    heapq.heapify(heap)
+    probability = [float(draw.probability) for draw in space.draws]
+    while heap and len(chance) < most:
+        weight, state = heapq.heappop(heap)
+        if state in chance:
+            continue
+        chance[state] = -weight
+        choice = int(found.policy[state])
+        if choice >= 0 and not space.goal[state]:
+            for edge in range(int(space.edge_first[choice]), int(space.edge_first[choice + 1])):
+                target = int(space.edge_target[edge])
+                if target not in chance:
+                    heapq.heappush(heap, (weight * probability[int(space.edge_draw[edge])], target))
+    if not heap:
+        return None
+    only = np.zeros_like(found.best)
+    choices = found.policy[np.array(sorted(chance), dtype=np.int64)]
+    only[choices[choices >= 0]] = True
+    return offers_of(space, only)
 
 
 def _fewest_actions(found: Reachability, limits: Limits) -> tuple[Number, Flags]:
