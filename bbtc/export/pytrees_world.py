@@ -6,15 +6,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from fractions import Fraction
 
-from bbtc.export.interface import Interface, guard_of
+from bbtc.export.interface import Interface
 from bbtc.export.names import Symbol
 from bbtc.export.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
 from bbtc.export.pytrees_parts import ConditionCode, condition_type, fact_of, method
-from bbtc.export.shape import normal
-from bbtc.ground.condition import FALSE, TRUE, variables
-from bbtc.ground.task import Factor, GroundAction, Outcome, Task
+from bbtc.export.world_model import actions_used, changes_of, initial_values, relevant_variables
+from bbtc.ground.task import Factor, Outcome, Task
 from bbtc.kleene import Truth
-from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, actions_of, walk
+from bbtc.tree.nodes import Tree
 
 _VALUES = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
 
@@ -29,9 +28,8 @@ class WorldWriter:
         self._interface = interface
         self._methods = methods
         self._conditions = conditions
-        names = dict.fromkeys(node.action for node in actions_of(tree.root))
-        self._actions = [self._task.action_by_name[name] for name in sorted(names)]
-        self._relevant = sorted(_relevant(tree, self._actions))
+        self._actions = actions_used(tree)
+        self._relevant = relevant_variables(tree)
 
     def tables(self) -> list[list[str]]:
         """``INITIAL`` and ``ACTIONS``."""
@@ -60,10 +58,7 @@ class WorldWriter:
         return lines
 
     def _initial(self) -> Code:
-        merged: dict[tuple[Truth, ...], Fraction] = {}
-        for state in self._task.initial:
-            seen = tuple(state.values[index] for index in self._relevant)
-            merged[seen] = merged.get(seen, Fraction(0)) + state.probability
+        merged = initial_values(self._task, self._relevant)
         return sequence(
             call("", _probability(p), self._state(zip(self._relevant, values, strict=True)))
             for values, p in merged.items()
@@ -80,43 +75,17 @@ class WorldWriter:
         return sequence(sequence(map(self._outcome, factor.outcomes)) for factor in factors)
 
     def _outcome(self, outcome: Outcome) -> Code:
-        always: dict[int, Truth] = {}
-        conditional: list[Code] = []
-        for effect in outcome.effects:
-            when = TRUE if effect.when is None else normal(self._task, effect.when)
-            changes: dict[int, Truth] = always if when == TRUE else {}
-            for index, value in effect.sets:  # the Kleene maximum wins
-                changes[index] = max(value, changes.get(index, Truth.FALSE))
-            if when not in (TRUE, FALSE) and changes:
-                condition = Prefixed("lambda s: ", self._conditions.write(when, self._read))
-                conditional.append(call("When", condition, self._state(changes.items())))
-        items = [_probability(outcome.probability), self._state(always.items()), *conditional]
+        always, *conditional = changes_of(self._task, outcome)
+        items: list[Code] = [_probability(outcome.probability), self._state(always.sets.items())]
+        for changes in conditional:
+            condition = Prefixed("lambda s: ", self._conditions.write(changes.when, self._read))
+            items.append(call("When", condition, self._state(changes.sets.items())))
         if outcome.factors:
             items.append(Prefixed("then=", self._factors(outcome.factors)))
         return call("Outcome", *items)
 
     def _read(self, index: int) -> Code:
         return f"s[{self._fact(index)}]"
-
-
-def _relevant(tree: Tree, actions: list[GroundAction]) -> set[int]:
-    """What the tree or an effect reads, or an action of the tree sets."""
-    task = tree.task
-    found: set[int] = set()
-    for node in walk(tree.root):
-        if isinstance(node, ConditionNode):
-            found.update(variables(normal(task, node.condition)))
-        elif isinstance(node, ActionNode):
-            found.update(variables(guard_of(task, node) or TRUE))
-    stack = [factor for action in actions for factor in action.factors]
-    while stack:
-        for outcome in stack.pop().outcomes:
-            stack.extend(outcome.factors)
-            for effect in outcome.effects:
-                found.update(index for index, _ in effect.sets)
-                if effect.when is not None:
-                    found.update(variables(normal(task, effect.when)))
-    return found
 
 
 def _probability(value: Fraction) -> str:
