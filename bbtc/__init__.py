@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         plan,
         scenarios,
         simulate,
+        verify,
     )
     from bbtc.belief.simulate import Figures
     from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
@@ -64,6 +65,7 @@ __all__ = [
     "plan",
     "scenarios",
     "simulate",
+    "verify",
 ]
 
 _HOMES = MappingProxyType(
@@ -83,7 +85,7 @@ _HOMES = MappingProxyType(
 )
 """The modules of what does not stand in ``api``."""
 
-_NAMESAKES = ("build", "export", "plan")
+_NAMESAKES = ("build", "export", "plan", "verify")
 """Functions of ``api`` that are subpackages, too."""
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from bbtc.plan.options import Retries
     from bbtc.plan.result import Plan, Refinement
     from bbtc.tree.nodes import Tree
+    from bbtc.verify.verdict import Engine, Verdict
 
 Source: TypeAlias = "str | os.PathLike[str] | SourceFile"
 """The path of a file, or a text with the name it is shown under."""
@@ -178,6 +179,18 @@ def scenarios(tree: Source | Tree | Plan, count: int, *, limits: Limits | None =
     from bbtc.belief.scenarios import scenarios as runs
 
     return list(islice(runs(pipeline.simulate_tree(_tree(tree, limits), limits or Limits())[1]), count))
+
+
+def verify(
+    tree: Source | Tree | Plan, *, engine: Engine = "auto", limits: Limits | None = None
+) -> Verdict:
+    """The figures of a tree recomputed without the simulator and the planner, by our own solver, by Storm,
+    or by both (``own``, ``storm``, ``all``; ``auto``: own, and Storm if it is installed). What is not
+    as the tree claims stands in the verdict's ``problems``. Raises as :func:`simulate` does, and
+    :class:`BbtcError` where Storm is wanted and cannot answer."""
+    from bbtc import pipeline
+
+    return pipeline.verify_tree(_tree(tree, limits), limits or Limits(), engine)
 
 
 def export(

@@ -144,3 +144,9 @@ def test_the_layer_of_verification_is_told_apart() -> None:
     contract = 'source_modules = ["bbtc.verify"]\nforbidden_modules = ["bbtc.belief", "bbtc.plan"]\n'
     assert contract in text
     assert not text.split(contract)[1].startswith("allow_indirect_imports")
+
+
+def test_verify_is_a_function_of_the_package() -> None:
+    import bbtc as package
+
+    assert package.verify(soda_tree(), engine="own").problems == ()
