@@ -181,7 +181,7 @@ class Names:
     def _inferred_type(self, name: ast.Name) -> str:
         """The type that an undeclared name stands for: itself, taken as declared; ``object`` if nothing has
         it but the place of a predicate, where a type only says what may stand there; none after reporting
-        what seems misspelt, or a type that one action alone knows."""
+        what seems misspelt, be it here or in its declaration, or a type that one action alone knows."""
         key = name.key
         known = {k: t for k, t in self._declared("type", self.hierarchy.types).items() if k != OBJECT}
         near, alone = slip(key, known), len(self.uses.types[key]) < 2
@@ -190,7 +190,8 @@ class Names:
                 self._infer("type", name, "anything is taken to fit here", near)
             return OBJECT
         idle = bool(known) and self.section != "objects"
-        if not alone or (near is None and not idle):
+        unused = near is not None and near not in self.uses.types  # then the declaration is misspelt
+        if not unused and (not alone or (near is None and not idle)):
             self._infer("type", name, "it is taken as a type without supertype", near)
             added = {key: Type(key, (), name.span)}
             self.hierarchy = TypeHierarchy({**self.hierarchy.types, **added})
