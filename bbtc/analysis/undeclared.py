@@ -2,7 +2,8 @@
 
 Public files leave out declarations that their planners never asked for. What such a name means is plain from
 its use, so it is taken as declared, with a warning; but a name that stands in one place only and is spelt
-like a declared one is a slip, and an error; so is a type spelt like one that is declared, but that nothing has.
+like a declared one is a slip, and an error. So is a type spelt like one that
+is declared and that nothing has.
 """
 
 from __future__ import annotations
