@@ -36,7 +36,9 @@ def export(
     figures: Mapping[str, Fraction] | None = None,
 ) -> str | bytes:
     exporter = load_exporter(form)
-    return exporter.export(tree, parse_options(exporter, options or {}), figures)
+    written = exporter.export(tree, parse_options(exporter, options or {}), figures)
+    assert isinstance(written, (str, bytes))
+    return written
 
 
 def templated() -> Tree:
