@@ -28,6 +28,22 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print the sums of what tests say with ``record_property("compared", (what, unit, number))``."""
+    sums: dict[str, dict[str, int]] = {}
+    for report in terminalreporter.getreports("passed"):
+        for name, value in report.user_properties:
+            if name == "compared" and isinstance(value, list | tuple):
+                what, unit, number = value
+                units = sums.setdefault(str(what), {})
+                units[str(unit)] = units.get(str(unit), 0) + int(str(number))
+    if sums:
+        terminalreporter.section("compared, without a difference")
+    for what, units in sorted(sums.items()):
+        counted = ", ".join(f"{number:,} {unit}" for unit, number in units.items())
+        terminalreporter.write_line(f"{what}: {counted}")
+
+
 @dataclass(frozen=True)
 class Golden:
     """Compares artefacts with the files under ``tests/golden/``."""

@@ -4,6 +4,7 @@ the same order, the same end, the same final state."""
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import pytest
 
@@ -11,29 +12,28 @@ from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
 from bbtc.limits import Limits
 from tests.domains.problems import PROBLEMS, Problem, plan_of
-from tests.replay.engines import BtcppReplay, PyTreesReplay
+from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.script import TIMINGS, run_of, script_of
 
 MOST = 500
 """Scenarios of a problem, the most probable first; most problems have fewer."""
 
-MOST_TIMED = 100
-"""Scenarios replayed three times, with outcomes that land earlier and later in a tick, too."""
 
-
-@pytest.mark.parametrize("engine", [PyTreesReplay, BtcppReplay])
+@pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_every_scenario_runs_as_simulated(
-    problem: Problem, engine: type[PyTreesReplay] | type[BtcppReplay]
+    problem: Problem, name: EngineName, record_property: Callable[[str, object], None]
 ) -> None:
-    if engine is BtcppReplay:
-        pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
     tree = plan_of(problem).tree
-    replay = engine(tree)
     runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits())), MOST))
     assert runs
     assert len(runs) == MOST or sum(run.probability for run in runs) == 1
-    for number, scenario in enumerate(runs):
-        for timing in TIMINGS if number < MOST_TIMED else TIMINGS[:1]:
-            assert replay.run(script_of(scenario), timing) == run_of(scenario), (timing, scenario)
-    print(f"{problem}: {len(runs)} scenarios replayed")
+    scripts, expected = [script_of(run) for run in runs], [run_of(run) for run in runs]
+    with engine(name) as (version, make):
+        replay = make(tree, "embedded")
+        for timing in TIMINGS:
+            done = replay.runs((script, timing) for script in scripts)
+            different = [row for row in zip(scripts, expected, done, strict=True) if row[1] != row[2]]
+            assert different == [], timing
+        compared = Compared(record_property, f"problems of our domains: simulator and {version}")
+        compared.add(problems=1, scenarios=len(runs), runs=len(runs) * len(TIMINGS))

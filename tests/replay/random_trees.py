@@ -102,6 +102,29 @@ def _with_templates(node: Node, rng: random.Random) -> Node:
     return replace(node, template=f"{rng.choice('st')}({','.join(args)})")
 
 
+def busy_tree(seed: int, latched: float = 1.0, starts: int = 4) -> Tree:
+    """A tree that may start in up to ``starts`` states and of which several parts get their turn, with
+    at least three action nodes."""
+    rng = random.Random(seed)
+    while True:
+        task = random_task(rng)
+        drawn = sorted({random_initial(rng, task.variables) for _ in range(starts)})
+        share = Fraction(1, len(drawn))
+        task = replace(task, initial=tuple(InitialState(share, values) for values in drawn))
+        grower = _Grower(rng, task, latched, 0.3)
+        choices: list[tuple[ControlKind, ControlKind, Condition]] = [
+            ("sequence", "fallback", TRUE),
+            ("fallback", "sequence", FALSE),
+        ]
+        kind, inner, end = rng.choice(choices)
+        *first, last = [grower.node(3, False) for _ in range(rng.randint(2, 4))]
+        # Whatever becomes of a part, the next one follows.
+        parts = [grower.control(inner, part, grower.check(end)) for part in first]
+        root = grower.control(kind, *parts, last)
+        if sum(1 for _ in actions_of(root)) >= 3:
+            return Tree(task, root, Fraction(1, 2), Fraction(1), "stuck")
+
+
 class _Grower:
     def __init__(self, rng: random.Random, task: Task, latched: float, guarded: float) -> None:
         self.rng = rng

@@ -14,6 +14,7 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 from tests.replay.script import Run, Script, Values
+from tests.replay.ticks import Tick, TickScript, TickWorld
 
 AND = {"TT": "T", "TU": "U", "TF": "F", "UT": "U", "UU": "U", "UF": "F", "FT": "F", "FU": "F", "FF": "F"}
 OR = {"TT": "T", "TU": "T", "TF": "T", "UT": "T", "UU": "U", "UF": "U", "FT": "T", "FU": "U", "FF": "F"}
@@ -58,19 +59,7 @@ class Ticking:
         if isinstance(node, ConditionNode):
             return STATUS[value_of(node.condition, self.values)]
         if isinstance(node, ActionNode):
-            if node.id in self.finished:
-                return "success"
-            if node.guarded:
-                allowed = value_of(self.task.action_by_name[node.action].precondition, self.values)
-                if allowed != "T":
-                    return STATUS[allowed]
-            if any(self.tries.get(retry.id, 0) == retry.attempts for retry in self.around):
-                return "failure"
-            assert self.started is None, "a tick starts at most one action"
-            self.started = node
-            for retry in self.around:
-                self.tries[retry.id] = self.tries.get(retry.id, 0) + 1
-            return "running"
+            return self.act(node)
         assert isinstance(node, ControlNode)
         if node.kind == "retry":
             self.around.append(node)
@@ -83,9 +72,105 @@ class Ticking:
                 return status
         return GOES_ON[node.kind]
 
+    def act(self, node: ActionNode) -> str:
+        """The status of an action node, which starts its action where it may."""
+        if node.id in self.finished:
+            return "success"
+        if node.guarded:
+            allowed = value_of(self.task.action_by_name[node.action].precondition, self.values)
+            if allowed != "T":
+                return STATUS[allowed]
+        if any(self.tries.get(retry.id, 0) == retry.attempts for retry in self.around):
+            return "failure"
+        assert self.started is None, "a tick starts at most one action"
+        self.started = node
+        for retry in self.around:
+            self.tries[retry.id] = self.tries.get(retry.id, 0) + 1
+        return "running"
+
     def started_now(self) -> ActionNode | None:
         """The action the last tick started."""
         return self.started
+
+
+@dataclass
+class Running(Ticking):
+    """A run in which actions take many ticks: docs/multi-tick-actions.md, as plainly."""
+
+    world: TickWorld = field(kw_only=True)
+    runs: ActionNode | None = None
+    called: bool = False
+    failed: set[str] = field(default_factory=set)
+
+    def act(self, node: ActionNode) -> str:
+        """The status of an action node, which calls its action if it runs or may start."""
+        if node is self.runs:
+            self._call(node, self.world.go_on(node.id))
+            return "running"
+        if node.id in self.failed:
+            return "failure"
+        status = super().act(node)
+        if self.started is node:
+            self._cancel()
+            self._call(node, self.world.start(node.action, node.id))
+        return status
+
+    def _call(self, node: ActionNode, ended: bool) -> None:
+        self.called = True
+        self.runs = None if ended else node
+        if ended and node.latched:
+            (self.finished if self.world.succeeds else self.failed).add(node.id)
+
+    def _cancel(self) -> None:
+        if self.runs is not None:
+            self.world.cancel(self.runs.id)
+            if self.runs.latched:
+                self.finished.add(self.runs.id)
+            self.runs = None
+
+    def tick_root(self, root: Node) -> str:
+        """One tick. What it does not call is cancelled; where nothing is called, nothing runs."""
+        self.values, self.started, self.called = self.world.values, None, False
+        status = self.tick(root)
+        if not self.called:
+            self._cancel()
+        return "failure" if status == "running" and not self.called else status
+
+    def trace(self, root: Node, script: TickScript) -> list[Tick]:
+        """What happens in every tick of a script, until the tree ends."""
+        for number in range(len(script.before)):
+            self.world.next_tick()
+            status = self.tick_root(root)
+            self.world.tick_ended(status)
+            if status != "running":
+                break
+            if number in script.halts:
+                self._cancel()
+        return self.world.ticks
+
+
+def expected_ticks(task: Task, root: Node, script: TickScript) -> list[Tick]:
+    """What the page says that happens in every tick."""
+    return Running(task, (), world=TickWorld(task, script)).trace(root, script)
+
+
+def expected_run(task: Task, root: Node, script: Script) -> Run:
+    """What a tree does with a script."""
+    run = Ticking(task, script.initial)
+    names: list[str] = []
+    for step in range(len(script.steps) + 1):
+        run.started = None
+        status = run.tick(root)
+        started = run.started_now()
+        if started is None:
+            return Run(tuple(names), "success" if status == "success" else "failure", run.values)
+        names.append(started.action)
+        if step == len(script.steps) or script.steps[step][0] != started.action:
+            break
+        run.values = script.steps[step][1]
+        if started.latched:
+            run.finished.add(started.id)
+    return Run(tuple(names), "cut", run.values)
 
 
 def varied_runs(task: Task, root: Node, seed: int, keep: int = 8, most: int = 8) -> list[tuple[Script, Run]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 from bbtc.belief.scenarios import Scenario
 from bbtc.belief.tick import Status
@@ -13,11 +13,12 @@ from bbtc.ground.task import Task
 Values = tuple[int, ...]
 """The truth value of every variable, by index (0 false, 1 unknown, 2 true)."""
 
-Timing = Literal["between", "during", "within"]
-"""When the outcome of an action lands: between the tick that starts it and the next; in a later
-tick, while it goes on running; within the tick that starts it, which also ends it."""
+Timing = Literal["between", "during", "within", "after"]
+"""When the outcome of an action lands: between the tick that starts it and the next; during its run, in
+the tick after the one that starts it and before the one that ends it; within the tick that starts it,
+which also ends it; after its run, that is, after the third tick, in which it says that it has ended."""
 
-TIMINGS: tuple[Timing, ...] = ("between", "during", "within")
+TIMINGS: tuple[Timing, ...] = ("between", "during", "within", "after")
 
 
 @dataclass(frozen=True)
@@ -58,18 +59,36 @@ class OffScript(Exception):
     """The tree started an action that the script does not have at this place."""
 
 
+class World(Protocol):
+    """What the nodes of an engine call: conditions :meth:`read`, actions :meth:`start`, then
+    :meth:`go_on` until that says that they ended, in success or not; or else :meth:`cancel`."""
+
+    succeeds: bool
+
+    def read(self, variable: str) -> int: ...
+
+    def start(self, action: str, runner: Hashable) -> bool: ...
+
+    def running(self, runner: Hashable) -> bool: ...
+
+    def go_on(self, runner: Hashable) -> bool: ...
+
+    def cancel(self, runner: Hashable) -> None: ...
+
+
 class ScriptedWorld:
-    """Plays a script for any engine. An engine's nodes call :meth:`start`, then :meth:`go_on`
-    until that says that the action ended; its loop calls :meth:`between_ticks`."""
+    """Plays a script for any engine, whose loop calls :meth:`between_ticks`."""
 
     def __init__(self, task: Task, script: Script, timing: Timing) -> None:
         self.values = script.initial
         self.actions: list[str] = []
         self.cancelled: list[str] = []
         self.timing = timing
+        self.succeeds = True
         self._index = task.variable_index
         self._script = script
         self._pending: Values | None = None
+        self._ended = False
         self._ticks_run: dict[Hashable, int] = {}
         self._action_of: dict[Hashable, str] = {}
 
@@ -88,6 +107,7 @@ class ScriptedWorld:
             self.values = after
             return True
         self._pending = after
+        self._ended = False
         self._ticks_run[runner] = 1
         self._action_of[runner] = action
         return False
@@ -98,12 +118,12 @@ class ScriptedWorld:
 
     def go_on(self, runner: Hashable) -> bool:
         """A running action is ticked again. Whether it has ended now."""
-        self._ticks_run[runner] += 1
-        if self.timing == "during":
-            if self._ticks_run[runner] == 3 and self._pending is not None:
-                self._land()
-            if self._ticks_run[runner] < 5:
-                return False
+        ticks = self._ticks_run[runner] = self._ticks_run[runner] + 1
+        if self.timing == "during" and ticks == 2 and self._pending is not None:
+            self._land()
+        if ticks < (2 if self.timing == "between" else 3):
+            return False
+        self._ended = True
         del self._ticks_run[runner]
         return True
 
@@ -115,7 +135,8 @@ class ScriptedWorld:
 
     def between_ticks(self) -> None:
         """The engine has finished a tick."""
-        if self.timing == "between" and self._pending is not None:
+        lands = self.timing == "between" or (self.timing == "after" and self._ended)
+        if lands and self._pending is not None:
             self._land()
 
     def _land(self) -> None:

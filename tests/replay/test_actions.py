@@ -12,6 +12,7 @@ from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from tests.replay.engines import BtcppReplay, PyTreesReplay
 from tests.replay.script import TIMINGS, Run, Script, Timing
+from tests.replay.ticks import Tick, TickScript, TickWorld
 
 P, Q, R = (Is(index, Truth.TRUE) for index in range(3))
 TRUE_, FALSE_, UNKNOWN_ = 2, 0, 1
@@ -92,6 +93,100 @@ def test_a_tree_that_nothing_can_unblock_fails(engine: Engine, timing: Timing) -
     root = control("sequence", control("skipper", check(P), ActionNode("a", "go()")), check(Q))
     run = engine(tree_of(root)).run(Script((1, 1, 0), (("go()", (TRUE_, UNKNOWN_, 0)),)), timing)
     assert run == Run(("go()",), "failure", (TRUE_, UNKNOWN_, 0))
+
+
+# --- docs/multi-tick-actions.md, rule by rule --------------------------------------------------
+
+
+def script(*before: tuple[int, int, int], runs: tuple[tuple[int, bool], ...], halts: int = -1) -> TickScript:
+    """The values of p, q, r before each tick; they do not change within one."""
+    return TickScript(before, (None,) * len(before), runs, frozenset({halts}))
+
+
+def shown(ticks: list[Tick]) -> list[str]:
+    """A tick as one line: ``+`` starts, ``.`` goes on, ``-`` is cancelled."""
+    return [
+        " ".join(
+            [*("+" + a for a in t.started), *("." + a for a in t.went_on), *("-" + a for a in t.cancelled)]
+        )
+        + f" {t.status}"
+        for t in ticks
+    ]
+
+
+N, Y, U = (FALSE_, 0, 0), (TRUE_, 0, 0), (UNKNOWN_, 0, 0)
+WANTED = control("fallback", check(P), control("sequence", ActionNode("a", "go()"), check(P)))
+
+
+def test_an_action_is_called_until_it_ends_and_its_end_shows_in_the_next_tick(engine: Engine) -> None:
+    ticks = engine(tree_of(WANTED)).trace(script(N, N, N, N, runs=((3, True),)))
+    assert shown(ticks) == ["+go() running", ".go() running", ".go() running", " failure"]
+
+
+def test_an_action_that_ends_in_the_tick_that_starts_it_is_running_in_it(engine: Engine) -> None:
+    ticks = engine(tree_of(WANTED)).trace(script(N, Y, runs=((1, True),)))
+    assert shown(ticks) == ["+go() running", " success"]
+
+
+def test_an_action_is_cancelled_in_the_tick_that_does_without_it(engine: Engine) -> None:
+    ticks = engine(tree_of(WANTED)).trace(script(N, N, Y, runs=((9, True),)))
+    assert shown(ticks) == ["+go() running", ".go() running", "-go() success"]
+
+
+def test_an_action_is_cancelled_where_a_precondition_fails_and_does_not_start_again(engine: Engine) -> None:
+    root = control(
+        "fallback",
+        control("sequence", check(P), ActionNode("a", "go()"), check(Q)),
+        control("sequence", ActionNode("b", "do()"), check(Q)),
+    )
+    ticks = engine(tree_of(root)).trace(script(Y, N, Y, Y, runs=((9, True), (2, True))))
+    assert shown(ticks) == ["+go() running", "+do() -go() running", ".do() running", " failure"]
+
+
+def test_an_action_whose_condition_becomes_unknown_is_cancelled_and_nothing_goes_on(engine: Engine) -> None:
+    ticks = engine(tree_of(WANTED)).trace(script(N, U, runs=((9, True),)))
+    assert shown(ticks) == ["+go() running", "-go() failure"]
+
+
+def test_a_failed_action_fails_once_it_has_ended_and_is_not_tried_again(engine: Engine) -> None:
+    root = control("fallback", ActionNode("a", "go()"), ActionNode("b", "do()"))
+    ticks = engine(tree_of(root)).trace(script(N, N, N, N, runs=((2, False), (1, True))))
+    assert shown(ticks) == ["+go() running", ".go() running", "+do() running", " success"]
+
+
+def test_an_action_that_is_not_latched_starts_again_after_every_end(engine: Engine) -> None:
+    root = control("fallback", check(P), ActionNode("a", "go()", latched=False))
+    ticks = engine(tree_of(root)).trace(script(N, N, N, N, Y, runs=((2, True), (1, False), (9, True))))
+    expected = ["+go() running", ".go() running", "+go() running", "+go() running", "-go() success"]
+    assert shown(ticks) == expected
+
+
+def test_a_cancelled_attempt_counts_below_a_retry_node(engine: Engine) -> None:
+    go = ActionNode("a", "go()", latched=False)
+    tries = control("fallback", control("sequence", check(P), go), check(Q))
+    root = control("fallback", ControlNode("r", "retry", (tries,), attempts=2), ActionNode("b", "do()"))
+    ticks = engine(tree_of(root)).trace(script(Y, N, Y, Y, runs=((9, True), (1, True), (1, True))))
+    assert shown(ticks) == ["+go() running", "+do() -go() running", "+go() running", " success"]
+
+
+def test_a_tree_that_is_halted_by_a_larger_one_cancels_what_runs_and_can_go_on(engine: Engine) -> None:
+    root = control("sequence", ActionNode("a", "go()"), ActionNode("b", "do()"))
+    ticks = engine(tree_of(root)).trace(script(N, N, N, N, runs=((9, True), (2, True)), halts=1))
+    assert shown(ticks) == ["+go() running", ".go() -go() running", "+do() running", ".do() running"]
+
+
+def test_halting_all_of_behaviortree_cpp_cancels_what_runs(engine: Engine) -> None:
+    if engine is PyTreesReplay:
+        pytest.skip("the function is BehaviorTree.CPP's")
+    root = control("sequence", ActionNode("a", "go()"), ActionNode("b", "do()"))
+    replay = engine(tree_of(root))
+    assert isinstance(replay, BtcppReplay)
+    world = TickWorld(replay.task, script(N, runs=((9, True),)))
+    replay.begin(world)
+    world.next_tick()
+    assert replay.tick() == "running"
+    replay.halt_all()
+    assert shown(world.ticks) == ["+go() -go() "]
 
 
 def test_a_failure_of_the_real_action_is_withheld_and_kept() -> None:

@@ -1,41 +1,44 @@
-"""Exported trees do what the semantics page says: same actions, same end, same final state."""
+"""Exported trees do what the semantics page says, with actions that are not latched, too, and with
+any outcomes: same actions, same end, same final state."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from bbtc.tree.nodes import Tree
-from tests.replay.engines import BtcppReplay, PyTreesReplay
+from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import varied_runs
 from tests.replay.script import TIMINGS, Run, Script
 
-TREES = 250
+TREES = 1000 if os.environ.get("BBTC_LONG") else 200
 
 
-def lively_trees(latched: float) -> Iterator[tuple[Tree, list[tuple[Script, Run]]]]:
+def lively_trees() -> Iterator[tuple[Tree, list[tuple[Script, Run]]]]:
     """Random trees that act, each with some of its runs."""
     found = seed = 0
     while found < TREES:
         seed += 1
-        tree = random_tree(seed, latched)
+        tree = random_tree(seed, latched=0.6)
         runs = varied_runs(tree.task, tree.root, seed)
         if runs:
             found += 1
             yield tree, runs
 
 
-@pytest.mark.parametrize("latched", [1.0, 0.6], ids=["latched", "mixed"])
-@pytest.mark.parametrize("engine", [PyTreesReplay, BtcppReplay])
+@pytest.mark.parametrize("name", ENGINES)
 def test_random_trees_run_as_in_the_reference(
-    engine: type[PyTreesReplay] | type[BtcppReplay], latched: float
+    name: EngineName, record_property: Callable[[str, object], None]
 ) -> None:
-    if engine is BtcppReplay:
-        pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
-    for tree, runs in lively_trees(latched):
-        replay = engine(tree)
-        for script, expected in runs:
+    with engine(name) as (version, make):
+        compared = Compared(record_property, f"random trees with repeated actions: reference and {version}")
+        for tree, runs in lively_trees():
+            replay = make(tree, "embedded")
             for timing in TIMINGS:
-                assert replay.run(script, timing) == expected, (timing, script, replay.source)
+                done = replay.runs((script, timing) for script, _ in runs)
+                different = [row for row in zip(runs, done, strict=True) if row[0][1] != row[1]]
+                assert different == [], (timing, replay.source)
+            compared.add(trees=1, runs=len(runs) * len(TIMINGS))

@@ -118,23 +118,20 @@ class Latch(Decorator):
         keep: bool = True,
     ) -> None:
         super().__init__(name=name, child=Action(name, act, cancel))
-        self.acting = False
         self._guard = guard
         self._keep = keep
         self._started = False
         self._final: Status | None = None
 
     def tick(self) -> Iterator[Behaviour]:
-        self.acting = False
         if self._final is not None:
             self.stop(self._final)
             yield self
             return
         ready = True if self._started or self._guard is None else self._guard()
         if ready:
-            if not self._started:
-                self._preempt()
-            self.acting = self._started = True
+            self._announce()
+            self._started = True
             yield from self.decorated.tick()
             if self.decorated.status != Status.RUNNING:
                 self._end(self.decorated.status)
@@ -151,15 +148,12 @@ class Latch(Decorator):
         if new_status == Status.INVALID and self._started:
             self._end(Status.SUCCESS)
 
-    def _preempt(self) -> None:
-        # py_trees would interrupt the action that ran before only after this one has started: the
-        # robot, asked for the same action by both, could not tell the second from the first.
-        root: Behaviour = self
-        while root.parent is not None and not isinstance(root, StopWhenBlocked):
-            root = root.parent
-        for node in root.iterate():
-            if isinstance(node, Latch) and node is not self and node.status == Status.RUNNING:
-                node.stop(Status.INVALID)
+    def _announce(self) -> None:
+        above = self.parent
+        while above is not None and not isinstance(above, StopWhenBlocked):
+            above = above.parent
+        if above is not None:
+            above.acts(self)
 
     def _end(self, status: Status) -> None:
         self._started = False
@@ -216,20 +210,31 @@ class StopWhenBlocked(Decorator):
     def __init__(self, robot: object, child: Behaviour) -> None:
         super().__init__(name="stop when blocked", child=child)
         self._robot = robot
+        self._acting = False
+        self._last: Latch | None = None
 
     def setup(self, **kwargs: Any) -> None:
         if isinstance(self._robot, WithSetup):
             self._robot.setup(**kwargs)
 
+    def acts(self, latch: Latch) -> None:
+        """A latch below is about to run its action in this tick."""
+        # py_trees would interrupt the action that ran before only after this one has started: the
+        # robot, asked for the same action by both, could not tell the second from the first.
+        if self._last is not None and self._last is not latch and self._last.status == Status.RUNNING:
+            self._last.stop(Status.INVALID)
+        self._last = latch
+        self._acting = True
+
+    def tick(self) -> Iterator[Behaviour]:
+        self._acting = False
+        yield from super().tick()
+
     def update(self) -> Status:
-        status = self.decorated.status
-        if status == Status.RUNNING and not any(
-            isinstance(node, Latch) and node.acting and node.status == Status.RUNNING
-            for node in self.decorated.iterate()
-        ):
+        if self.decorated.status == Status.RUNNING and not self._acting:
             self.feedback_message = "blocked: nothing can observe what is unknown"
             return Status.FAILURE
-        return status
+        return self.decorated.status
 
 
 def run(root: Behaviour, period: float = 0.0) -> Status:

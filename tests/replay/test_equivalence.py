@@ -1,0 +1,73 @@
+"""Random trees in every engine: each scenario of the exact simulation, with effects that land between
+ticks, during the run of an action and within the tick that starts it, has the same actions in the
+same order, the same end, and the same final state.
+
+In continuous integration 1,000 trees; ``BBTC_LONG=1`` takes as many more that start in any state.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from bbtc.belief.chain import explore
+from bbtc.belief.scenarios import Scenario, scenarios
+from bbtc.limits import Limits
+from bbtc.tree.nodes import Tree
+from tests.replay.all_engines import ENGINES, Compared, EngineName, Runtime, engine
+from tests.replay.random_trees import busy_tree
+from tests.replay.reference import expected_run
+from tests.replay.script import Timing, run_of, script_of
+
+LONG = bool(os.environ.get("BBTC_LONG"))
+CHUNKS = 8
+TREES = 125
+"""Trees of a chunk."""
+
+STARTS = 243 if LONG else 3
+MOST = 500
+"""Scenarios of a tree, the most probable first."""
+
+TIMINGS: tuple[Timing, ...] = ("between", "during", "within")
+
+
+def lively_trees(chunk: int) -> Iterator[tuple[int, Tree, list[Scenario]]]:
+    """Random trees of latched actions, each with all its scenarios (or the most probable), in one of
+    which at least three actions start; and a number for each."""
+    found = 0
+    for seed in itertools.count(chunk, CHUNKS):
+        tree = busy_tree(seed, starts=STARTS)
+        runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits())), MOST))
+        if max(len(run.steps) for run in runs) >= 3:
+            yield seed, tree, runs
+            found += 1
+        if found == TREES:
+            return
+
+
+@pytest.mark.parametrize("name", ENGINES)
+@pytest.mark.parametrize("chunk", range(CHUNKS))
+def test_random_trees_run_as_simulated(
+    chunk: int, name: EngineName, record_property: Callable[[str, object], None]
+) -> None:
+    with engine(name) as (version, make):
+        compared = Compared(record_property, f"random trees: simulator and {version}")
+        for seed, tree, runs in lively_trees(chunk):
+            runtime: Runtime = "imported" if seed % 3 else "embedded"
+            replay = make(tree, runtime)
+            expected = [run_of(run) for run in runs]
+            scripts = [script_of(run) for run in runs]
+            for timing in TIMINGS:
+                done = replay.runs((script, timing) for script in scripts)
+                different = [row for row in zip(scripts, expected, done, strict=True) if row[1] != row[2]]
+                assert different == [], (seed, timing)
+            compared.add(trees=1, scenarios=len(runs), runs=len(runs) * len(TIMINGS))
+
+
+def test_the_simulator_does_what_the_reference_says() -> None:
+    for _, tree, runs in lively_trees(0):
+        for run in runs:
+            assert expected_run(tree.task, tree.root, script_of(run)) == run_of(run)

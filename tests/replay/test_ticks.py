@@ -1,0 +1,79 @@
+"""Tick by tick: actions that run for many ticks, in worlds that change whenever they like, as
+docs/multi-tick-actions.md says."""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Callable, Hashable
+
+import pytest
+
+from tests.domains.problems import PROBLEMS, plan_of
+from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
+from tests.replay.random_trees import busy_tree
+from tests.replay.reference import Running, expected_ticks, value_of
+from tests.replay.script import Values
+from tests.replay.ticks import TickWorld, random_script
+
+TREES = 2000 if os.environ.get("BBTC_LONG") else 200
+SCRIPTS = 5
+TICKS = 20
+"""Ticks of a script; most trees end sooner."""
+
+
+@pytest.mark.parametrize("latched", [1.0, 0.6], ids=["latched", "mixed"])
+@pytest.mark.parametrize("name", ENGINES)
+def test_every_tick_is_as_in_the_reference(
+    name: EngineName, latched: float, record_property: Callable[[str, object], None]
+) -> None:
+    count = dict.fromkeys(("started", "went_on", "cancelled"), 0)
+    with engine(name) as (version, make):
+        compared = Compared(record_property, f"actions of many ticks: reference and {version}")
+        for seed in range(TREES):
+            tree, rng = busy_tree(seed, latched), random.Random(seed)
+            replay = make(tree, "imported")
+            for _ in range(SCRIPTS):
+                script = random_script(tree.task, rng, TICKS)
+                expected = expected_ticks(tree.task, tree.root, script)
+                assert replay.trace(script) == expected, (seed, script, replay.source)
+                for kind in count:
+                    count[kind] += sum(len(getattr(tick, kind)) for tick in expected)
+                compared.add(ticks=len(expected))
+            compared.add(trees=1)
+    compared.add(**{f"actions {kind.replace('_', ' ')}": number for kind, number in count.items()})
+    assert min(count.values()) > TREES / 2
+
+
+class WatchedWorld(TickWorld):
+    """Remembers the values that actions were started in."""
+
+    def start(self, action: str, runner: Hashable) -> bool:
+        self.starts.append((action, self.values))
+        return super().start(action, runner)
+
+    starts: list[tuple[str, Values]]
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_plans_run_as_in_the_reference_and_are_sound_whatever_changes(
+    name: EngineName, record_property: Callable[[str, object], None]
+) -> None:
+    with engine(name) as (version, make):
+        compared = Compared(record_property, f"plans in restless worlds: reference and {version}")
+        for problem in PROBLEMS:
+            tree, rng = plan_of(problem).tree, random.Random(1)
+            replay = make(tree, "imported")
+            for _ in range(20):
+                script = random_script(tree.task, rng, TICKS)
+                world = WatchedWorld(tree.task, script)
+                world.starts = []
+                reference = Running(tree.task, (), world=world)
+                expected = reference.trace(tree.root, script)
+                assert replay.trace(script) == expected, (problem, script)
+                for action, values in world.starts:
+                    assert value_of(tree.task.action_by_name[action].precondition, values) == "T"
+                if expected[-1].status == "success":
+                    assert value_of(tree.task.goal, reference.values) == "T"
+                compared.add(ticks=len(expected), starts=len(world.starts))
+            compared.add(problems=1)
