@@ -93,7 +93,7 @@ def _unread(model: md.Model) -> Iterator[tuple[md.Predicate, bool]]:
 
 def _unused_predicates(model: md.Model) -> Iterator[Diagnostic]:
     for predicate, written in _unread(model):
-        if not written:
+        if not written and not predicate.inferred:
             yield _warning("BBT0301", f"predicate `{predicate.name}` is never used", predicate.span)
 
 

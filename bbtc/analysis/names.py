@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
@@ -21,6 +21,11 @@ _NO_TYPE = ""
 """Stands for a type that is not known, which has been reported: it fits everything."""
 _TOLD = 10
 """How many undeclared names of a kind are told one by one."""
+_COMPARISONS = 30_000
+"""How often an undeclared name is compared with a declared one, which takes time: beyond that, names count
+as unlike any other. There are files that declare nothing."""
+_TYPES = 1000
+"""How many types are inferred."""
 
 
 class Declared(Protocol):
@@ -72,9 +77,12 @@ class Names:
     in_problem: bool = False
     """What is being read is the problem's."""
     _told: set[tuple[str, str, str]] = field(default_factory=set)
+    _known: dict[str, dict[str, Declared]] = field(default_factory=dict)
     _inferred: dict[tuple[str, str], None] = field(default_factory=dict)
     """Kind and key of what is taken as declared."""
     _counts: Counter[str] = field(default_factory=Counter)
+    _comparisons: int = 0
+    _slips: dict[tuple[str, str, int | None], str | None] = field(default_factory=dict)
     _told_in_sum: dict[str, ast.Term] = field(default_factory=dict)
     _uses: Uses | None = None
 
@@ -84,7 +92,9 @@ class Names:
         if (self.section, kind, key) in self._told:
             return
         self._told.add((self.section, kind, key))
-        near = slip(key, known) or nearest(key, known)
+        near = self._slip(kind, key, known)
+        if near is None and self._compares(known):
+            near = nearest(key, known)
         hint: str | None = None
         related: list[Related] = []
         if near is not None:
@@ -114,9 +124,31 @@ class Names:
         word = "first used" if (kind, declared.name) in self._inferred else "declared"
         return Related(f"`{declared.name}` is {word} here", declared.span)
 
-    def _declared(self, kind: str, known: Mapping[str, _D]) -> dict[str, _D]:
-        """Those of the known names that are declared, not inferred."""
-        return {key: each for key, each in known.items() if (kind, key) not in self._inferred}
+    def _declared(self, kind: str, known: Mapping[str, _D]) -> Mapping[str, _D]:
+        """Those of the known names that are declared, not inferred. What is declared is known before the
+        first name is inferred."""
+        if kind not in self._known:
+            self._known[kind] = dict(known)
+        return self._known[kind]  # type: ignore[return-value]
+
+    def _compares(self, known: Collection[str]) -> bool:
+        """May one more name be compared with these?"""
+        self._comparisons += len(known)
+        return self._comparisons <= _COMPARISONS
+
+    def _slip(
+        self, kind: str, key: str, known: Mapping[str, Declared], arity: int | None = None
+    ) -> str | None:
+        """The declared name that a name is a likely misspelling of; a predicate's has as many arguments."""
+        about = (kind, key, arity)
+        if about not in self._slips:
+            if not self._compares(known):
+                return None
+            alike: Iterable[str] = known
+            if arity is not None:
+                alike = [each for each in known if len(self.predicates[each].parameters) == arity]
+            self._slips[about] = slip(key, alike)
+        return self._slips[about]
 
     def _infer(self, kind: str, name: ast.Term, reading: str, near: str | None = None) -> None:
         """Say that a name is taken as declared, and as what."""
@@ -149,13 +181,13 @@ class Names:
         if found is not None:
             return found
         known = self._declared("predicate", self.predicates)
-        alike = {each: p for each, p in known.items() if len(p.parameters) == len(args)}
-        near, alone = slip(key, alike), self._stands_alone(key)
+        near, alone = self._slip("predicate", key, known, len(args)), self._stands_alone(key)
         if (alone and (near is not None or key not in self.uses.given)) or key in self.hierarchy.types:
             self.unknown("BBT0202", "predicate", name, known)
             return None
         parameters = tuple(Parameter(f"?{number}") for number in range(1, len(args) + 1))
-        self.predicates[key] = Predicate(key, parameters, derived=key in self.derived, span=name.span)
+        derived = key in self.derived
+        self.predicates[key] = Predicate(key, parameters, derived=derived, span=name.span, inferred=True)
         where = f"with {_count(len(args))}" if args else "without arguments"
         self._infer("predicate", name, f"it is taken as a predicate {where}", near)
         return self.predicates[key]
@@ -167,7 +199,7 @@ class Names:
         if self.in_problem or len(types) > 1 or _NO_TYPE in types:
             return False
         known = self._declared("object", self.objects)
-        near = slip(key, known)
+        near = self._slip("object", key, known)
         if key in known or (near is not None and self._stands_alone(key)):
             return False
         before = self.objects.get(key)
@@ -184,14 +216,15 @@ class Names:
         what seems misspelt, be it here or in its declaration, or a type that one action alone knows."""
         key = name.key
         known = {k: t for k, t in self._declared("type", self.hierarchy.types).items() if k != OBJECT}
-        near, alone = slip(key, known), len(self.uses.types[key]) < 2
+        near, alone = self._slip("type", key, known), len(self.uses.types[key]) < 2
         if self.section in {"predicates", "functions"} and key not in self.uses.bound:
             if ("type", key) not in self._inferred:
                 self._infer("type", name, "anything is taken to fit here", near)
             return OBJECT
         idle = bool(known) and self.section != "objects"
         unused = near is not None and near not in self.uses.types  # then the declaration is misspelt
-        if not unused and (not alone or (near is None and not idle)):
+        refused = unused or self._counts["type"] >= _TYPES
+        if not refused and (not alone or (near is None and not idle)):
             self._infer("type", name, "it is taken as a type without supertype", near)
             added = {key: Type(key, (), name.span)}
             self.hierarchy = TypeHierarchy({**self.hierarchy.types, **added})

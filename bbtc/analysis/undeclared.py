@@ -17,6 +17,8 @@ from bbtc.syntax import ast
 _DIGITS = re.compile(r"\d+")
 _LONG = 8
 """Letters from which on two of them may be wrong."""
+_LONGEST = 100
+"""Longer names are no words that one misspells, and take long to compare."""
 _MANY = 2000
 
 
@@ -80,6 +82,8 @@ def slip(key: str, known: Iterable[str]) -> str | None:
     """The known name that a name is a likely misspelling of: all but one letter of it are the same, or in
     long names all but two; neighbours may be swapped. Names that differ in their numbers alone are no
     misspellings, nor are names of one or two letters, or names with a part more, as in `k_open`."""
+    if len(key) > _LONGEST:
+        return None
     best: tuple[int, str] | None = None
     for name in likely(key, known):
         longest = max(len(key), len(name))

@@ -27,6 +27,8 @@ class Predicate:
     declared_three_valued: bool = False
     derived: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+    inferred: bool = field(default=False, compare=False, repr=False)
+    """Nothing declares it; it is known from its use."""
 
 
 @dataclass(frozen=True, slots=True)

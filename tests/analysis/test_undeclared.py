@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -89,6 +90,31 @@ def test_a_likely_slip_is_an_error(fields: str, more: str, severity: Severity) -
     _, report = _resolved(ONE_PLACE.format(fields, more))
     found = [d.severity for d in report if d.code in {"BBT0202", "BBT0225"} and "predicate" in d.message]
     assert found == [severity]
+
+
+def test_a_type_that_is_misspelt_where_it_is_declared_is_an_error() -> None:
+    actions = "".join(f"(:action a{n} :parameters (?r - room) :effect (p ?r))" for n in range(2))
+    _, report = _resolved(f"(define (domain d) (:types rooom) (:predicates (p ?r - room)) {actions})")
+    assert {d.code for d in report} == {"BBT0201"}
+    _, report = _resolved(f"(define (domain d) (:types hall) (:predicates (p ?r - room)) {actions})")
+    assert {d.code for d in report} == {"BBT0225"}
+
+
+@pytest.mark.parametrize("what", ["object{}", "p{}"])
+def test_thousands_of_names_are_reported_in_time(what: str) -> None:
+    declared = " ".join(f"object{n}" for n in range(1500))
+    used = " ".join(f"({name} object7)" if name[0] == "p" else f"(p {name})" for name in
+                    (f"{what.format(n)}x" for n in range(3000)))  # fmt: skip
+    start = time.process_time()
+    _resolved(
+        "(define (domain d) (:predicates (p ?x)))"
+        f"(define (problem q) (:domain d) (:objects {declared}) (:init {used}) (:goal (p object7)))"
+    )
+    assert time.process_time() - start < 20  # minutes, if each were compared with each
+
+
+def test_very_long_names_are_not_compared() -> None:
+    assert slip("a" * 100_000, ["a" * 99_999]) is None
 
 
 def test_many_names_are_told_in_sum() -> None:
