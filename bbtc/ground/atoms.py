@@ -52,6 +52,8 @@ class Atoms:
         """The values of every atom that may be something else than false."""
         reach = self.reach
         true, unknown = reach.values[Truth.TRUE][predicate], reach.values[Truth.UNKNOWN][predicate]
+        if reach.usage.is_static(predicate) and not unknown and true == reach.never_false.get(predicate):
+            return dict.fromkeys(true, (Truth.TRUE,))
         return {
             row: tuple(value for value in _VALUES if reach.can_be(value, predicate, row))
             for row in (true | unknown if unknown else true)

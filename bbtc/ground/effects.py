@@ -14,7 +14,7 @@ from bbtc.ground.atoms import Atoms
 from bbtc.ground.bulk import Shared
 from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
-from bbtc.ground.normal import Block, Chance, free, reads
+from bbtc.ground.normal import Block, Chance, free, groups, reads
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
 from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome
 from bbtc.ground.universe import Row
@@ -58,19 +58,18 @@ class _Loop:
         self._spend = lowering.spend
         pending = list(guard)
         later = {parameter.name for parameter in parameters}
-        self._first = self._ready(lowering, frame, pending, later)
-        self._levels: list[tuple[int, tuple[int, ...], list[Lowered]]] = []
+        self._first = self._lower(lowering, frame, _ready(pending, later))
+        self._levels: list[tuple[int, Callable[[Env], Sequence[int]], list[Lowered]]] = []
         for parameter in parameters:
             later.discard(parameter.name)
-            slot, members = frame.slot(parameter.name), lowering.universe.members(parameter.types)
-            self._levels.append((slot, members, self._ready(lowering, frame, pending, later)))
+            slot, parts = frame.slot(parameter.name), _ready(pending, later)
+            members = lowering.members(parameter, parts, frame)
+            self._levels.append((slot, members, self._lower(lowering, frame, parts)))
         self.trivial = not self._levels and not self._first
 
     @staticmethod
-    def _ready(lowering: Lowering, frame: Frame, pending: list[mf.Formula], later: set[str]) -> list[Lowered]:
-        ready = [part for part in pending if later.isdisjoint(free(part))]
-        pending[:] = [part for part in pending if not later.isdisjoint(free(part))]
-        return [lowering.normal(part, frame, strict=True) for part in ready]
+    def _lower(lowering: Lowering, frame: Frame, parts: list[mf.Formula]) -> list[Lowered]:
+        return [lowering.normal(part, frame, strict=True) for part in parts]
 
     def guards(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
         """For each binding, which is then in ``env``: the guard's conditions (no constants),
@@ -83,12 +82,20 @@ class _Loop:
         if level == len(self._levels):
             yield above
             return
-        slot, members, parts = self._levels[level]
+        slot, members_of, parts = self._levels[level]
+        members = members_of(env)
         self._spend(len(members))
         for env[slot] in members:
             conditions = _met(parts, env, above)
             if conditions is not None:
                 yield from self._enter(level + 1, env, conditions)
+
+
+def _ready(pending: list[mf.Formula], later: set[str]) -> list[mf.Formula]:
+    """The parts that can be looked at before what comes later is bound; they are pending no more."""
+    ready = [part for part in pending if later.isdisjoint(free(part))]
+    pending[:] = [part for part in pending if not later.isdisjoint(free(part))]
+    return ready
 
 
 def _met(parts: list[Lowered], env: Env, above: list[Condition]) -> list[Condition] | None:
@@ -134,26 +141,30 @@ class LoweredEffect:
     def __init__(self, owner: EffectLowering, block: Block, frame: Frame) -> None:
         self._frame = frame
         self._costs: list[_Addition] = []
-        self._items: list[tuple[_Loop, _Leaf]] = []
+        self._groups: list[tuple[_Loop, list[_Leaf]]] = []
         lowering = owner.lowering
         always: list[me.Set] = []
-        for item in block.items:
-            loop = _Loop(lowering, frame, item.parameters, item.guard)
-            match item.leaf:
-                case me.Set() as leaf if loop.trivial:
-                    always.append(leaf)
-                case me.Set(predicate, args, value):
-                    self._items.append((loop, _Setting(lowering.number(predicate, args, frame), value)))
-                case me.Add(to="cost") as leaf if loop.trivial:
-                    self._costs.append(_Addition(owner, leaf, frame))
-                case me.Add() as leaf:
-                    self._items.append((loop, _Addition(owner, leaf, frame)))
-                case _:
-                    assert_never(item.leaf)
+        for group in groups(block):
+            loop = _Loop(lowering, frame, group.parameters, group.guard)
+            leaves: list[_Leaf] = []
+            for leaf in group.leaves:
+                match leaf:
+                    case me.Set() if loop.trivial:
+                        always.append(leaf)
+                    case me.Set(predicate, args, value):
+                        leaves.append(_Setting(lowering.number(predicate, args, frame), value))
+                    case me.Add(to="cost") if loop.trivial:
+                        self._costs.append(_Addition(owner, leaf, frame))
+                    case me.Add():
+                        leaves.append(_Addition(owner, leaf, frame))
+                    case _:
+                        assert_never(leaf)
+            if leaves:
+                self._groups.append((loop, leaves))
         self._always = Settings(lowering, always, frame)
         self._chances = [_LoweredChance(owner, chance, frame) for chance in block.chances]
         self._draw = (
-            None if self._items or len(block.chances) != 1 else self._plain_draw(owner, block, always)
+            None if self._groups or len(block.chances) != 1 else self._plain_draw(owner, block, always)
         )
 
     def _plain_draw(self, owner: EffectLowering, block: Block, always: list[me.Set]) -> _Draw | None:
@@ -172,8 +183,10 @@ class LoweredEffect:
 
     @property
     def plain(self) -> list[Numbers] | None:
-        """The variables set by an effect without chance, quantifiers and guards; None for others."""
-        return None if self._items or self._chances else self._always.columns()
+        """The variables set by an effect without quantifiers and guards; None for others."""
+        if self._draw is not None:
+            return [numbers for _, settings in self._draw.branches for numbers in settings.columns()]
+        return None if self._groups or self._chances else self._always.columns()
 
     def factors(self, env: Env) -> tuple[tuple[Factor, ...], Fraction]:
         """Independent factors, and the cost that is certain.
@@ -187,7 +200,7 @@ class LoweredEffect:
 
     def all(self, rows: list[Row]) -> list[tuple[tuple[Factor, ...], Fraction]]:
         """:meth:`factors` of many argument rows."""
-        if self._items or (self._chances and self._draw is None):
+        if self._groups or (self._chances and self._draw is None):
             return [self.factors(self._frame.env(row)) for row in rows]
         if self._draw is None:
             made = certain(self._always.all(rows))
@@ -208,9 +221,10 @@ class LoweredEffect:
         """Every variable that may be set, with the conditions under which it is."""
         for always in self._always.numbers(env):
             yield always, above
-        for loop, leaf in self._items:
-            if isinstance(leaf, _Setting):
-                for conditions in loop.guards(env, above):
+        for loop, leaves in self._groups:
+            setters = [leaf for leaf in leaves if isinstance(leaf, _Setting)]
+            for conditions in loop.guards(env, above):
+                for leaf in setters:
                     number = leaf.number(env)
                     if number is not None:
                         yield number, conditions
@@ -225,9 +239,11 @@ class LoweredEffect:
         sets = self._always.values(env)
         if sets:
             part.sets[conjoin(above)] = sets
-        for loop, leaf in self._items:
+        for loop, leaves in self._groups:
             for conditions in loop.guards(env, above):
-                leaf.run(part, env, conjoin(conditions))
+                guard = conjoin(conditions)
+                for leaf in leaves:
+                    leaf.run(part, env, guard)
         for chance in self._chances:
             for factor in chance.factors(env, above):
                 if len(factor.outcomes) > 1:

@@ -172,6 +172,37 @@ class Lowering:
         get, read = self.atoms.numbers[predicate].get, frame.columns(args)
         return lambda rows: list(map(get, read(rows)))
 
+    def members(
+        self, parameter: Parameter, parts: list[mf.Formula], frame: Frame
+    ) -> Callable[[Env], Sequence[int]]:
+        """The objects to bind a parameter to. Of the parts, which are to hold of it, an atom that never
+        changes is taken out if there is one: then only those objects are given that it is true of."""
+        every = self.universe.members(parameter.types)
+        for part in parts:
+            if isinstance(part, mf.Atom) and parameter.name in part.args and self._settled(part):
+                if part.predicate in self.atoms.reach.usage.derived:
+                    continue
+                parts.remove(part)
+                return self._related(parameter, every, part, frame)
+        return lambda _env: every
+
+    def _related(
+        self, parameter: Parameter, every: tuple[int, ...], part: mf.Atom, frame: Frame
+    ) -> Callable[[Env], Sequence[int]]:
+        here = [place for place, arg in enumerate(part.args) if arg == parameter.name]
+        others = [place for place, arg in enumerate(part.args) if arg != parameter.name]
+        found: dict[Row, list[int]] = {}
+        order = {number: position for position, number in enumerate(every)}
+        leaves, _ = self.atoms.leaves(part.predicate, Truth.TRUE, strict=True)
+        for row, leaf in leaves.items():
+            number = row[here[0]]
+            if leaf is TRUE and number in order and all(row[place] == number for place in here):
+                found.setdefault(tuple([row[place] for place in others]), []).append(number)
+        for numbers in found.values():
+            numbers.sort(key=order.__getitem__)
+        read = frame.rows(tuple(part.args[place] for place in others))
+        return lambda env: found.get(read(env), ())
+
     def _late(self, part: mf.Formula) -> int:
         """Constant parts first: they often settle the whole without a look at the rest. Parts that
         are not constant keep their order."""

@@ -81,6 +81,28 @@ def _walk(
             assert_never(effect)
 
 
+@dataclass(frozen=True, slots=True)
+class Group:
+    """For every binding of ``parameters``: all the leaves, where all of ``guard`` is true."""
+
+    parameters: tuple[Parameter, ...]
+    guard: tuple[mf.Formula, ...]
+    leaves: tuple[me.Set | me.Add, ...]
+
+    @property
+    def sets(self) -> list[me.Set]:
+        """The leaves that set an atom."""
+        return [leaf for leaf in self.leaves if isinstance(leaf, me.Set)]
+
+
+def groups(block: Block) -> Iterator[Group]:
+    """The items of a block by parameters and guard, in order of appearance."""
+    found: dict[tuple[tuple[Parameter, ...], tuple[mf.Formula, ...]], list[me.Set | me.Add]] = {}
+    for item in block.items:
+        found.setdefault((item.parameters, item.guard), []).append(item.leaf)
+    return (Group(parameters, guard, tuple(leaves)) for (parameters, guard), leaves in found.items())
+
+
 def reads(block: Block) -> Iterator[str]:
     """The terms of a block, repeats and those that it binds itself included."""
     for item in block.items:

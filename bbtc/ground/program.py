@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from bbtc.ground.normal import Block, conjuncts, disjuncts, free, normal_form
+from bbtc.ground.normal import Block, Group, conjuncts, disjuncts, free, groups, normal_form
 from bbtc.ground.universe import Universe
 from bbtc.ground.usage import Usage, called
 from bbtc.kleene import Truth
@@ -129,26 +129,26 @@ class ProgramBuilder:
         parameters, block = schema.parameters, self.usage.blocks[schema.name]
         self._bound(block, self._count(parameters))
         precondition = list(conjuncts(normal_form(schema.precondition)))
-        groups = list(_groups(block, (), ()))
+        found = list(_all_groups(block))
         kept = schema.name in self._called
-        if not kept and len(groups) == 1 and not groups[0].parameters:
+        if not kept and len(found) == 1 and not found[0].parameters:
             # Nothing happens where the only guard is false: it may as well be a precondition.
-            precondition += groups[0].guard
-            groups = [_Group((), (), groups[0].leaves)]
+            precondition += found[0].guard
+            found = [Group((), (), found[0].leaves)]
         self._applicable(f"a{index}", parameters, precondition)
         action, shown = _atom(f"a{index}", parameters), _atom(f"e{index}", parameters)
         always = kept or any(
-            not group.parameters and not group.guard and any(map(_shows, group.leaves)) for group in groups
+            not group.parameters and not group.guard and any(map(_shows, group.leaves)) for group in found
         )
         self.program.actions.append(f"{'a' if always else 'e'}{index}")
-        for group in groups:
+        for group in found:
             scope = parameters + group.parameters
             for body in self._bodies(group.guard, group.parameters, scope, (action,)):
                 if not always:
                     self._shown(shown, group, body)
                 self._settings(group, scope, body)
 
-    def _shown(self, head: str, group: _Group, body: list[str]) -> None:
+    def _shown(self, head: str, group: Group, body: list[str]) -> None:
         """Making false does something only where the atom may be something else."""
         if any(map(_shows, group.leaves)):
             self._rule(head, body)
@@ -158,7 +158,7 @@ class ProgramBuilder:
             for letter in letters:
                 self._rule(head, [*body, self._call(f"{letter}{self.number[leaf.predicate]}", leaf.args)])
 
-    def _settings(self, group: _Group, scope: tuple[Parameter, ...], body: list[str]) -> None:
+    def _settings(self, group: Group, scope: tuple[Parameter, ...], body: list[str]) -> None:
         """What is set by leaves of one guard. Several start from what they mention."""
         if len(group.sets) > 1:
             terms = dict.fromkeys(term for leaf in group.sets for term in leaf.args if mf.is_parameter(term))
@@ -404,30 +404,15 @@ class ProgramBuilder:
         self._rules.append(f"{head} :- {', '.join(body)}." if body else f"{head}.")
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
-    """The leaves of an effect under one guard, for every binding of the parameters."""
-
-    parameters: tuple[Parameter, ...]
-    guard: tuple[mf.Formula, ...]
-    leaves: list[me.Set | me.Add]
-
-    @property
-    def sets(self) -> list[me.Set]:
-        """The leaves that set an atom."""
-        return [leaf for leaf in self.leaves if isinstance(leaf, me.Set)]
-
-
-def _groups(block: Block, around: tuple[Parameter, ...], guard: tuple[mf.Formula, ...]) -> Iterator[_Group]:
-    """The leaves of a block, of all branches of its chances, by parameters and guard."""
-    found: dict[tuple[tuple[Parameter, ...], tuple[mf.Formula, ...]], list[me.Set | me.Add]] = {}
-    for item in block.items:
-        found.setdefault((around + item.parameters, guard + item.guard), []).append(item.leaf)
-    for (parameters, guards), leaves in found.items():
-        yield _Group(parameters, guards, leaves)
+def _all_groups(
+    block: Block, around: tuple[Parameter, ...] = (), guard: tuple[mf.Formula, ...] = ()
+) -> Iterator[Group]:
+    """The groups of a block and of all branches of its chances, each with what stands around it."""
+    for group in groups(block):
+        yield Group(around + group.parameters, guard + group.guard, group.leaves)
     for chance in block.chances:
         for _, branch in chance.branches:
-            yield from _groups(branch, around + chance.parameters, guard + chance.guard)
+            yield from _all_groups(branch, around + chance.parameters, guard + chance.guard)
 
 
 def _shows(leaf: me.Set | me.Add) -> bool:

@@ -203,6 +203,23 @@ def test_static_facts_and_hopeless_actions_are_left_out() -> None:
     assert describe(task, task.actions[0].precondition) == "at(a)"
 
 
+_IDLE = """(define (domain d) (:types t) (:constants a b - t)
+  (:predicates (fixed ?x - t) (p ?x - t) (q ?x - t))
+  (:action guarded :parameters (?x ?y - t)
+    :effect (forall (?z - t) (when (and (fixed ?x) (fixed ?z)) (p ?z))))
+  (:action undo :parameters (?x - t) :precondition (fixed ?x) :effect (and (not (q b)) (not (p ?x))))
+  (:action cost :parameters (?x - t) :effect (increase (total-cost) 1))
+  (:action reward :parameters (?x - t) :effect (when (fixed ?x) (increase (reward) 1))))
+(define (problem x) (:domain d) (:init (fixed a)) (:goal (p a)))"""
+
+
+def test_actions_that_can_do_nothing_are_left_out() -> None:
+    task = instantiate(model_of(_IDLE), Report(), Limits())
+    assert list(task.action_by_name) == ["guarded(a,a)", "guarded(a,b)", "reward(a)", "undo(a)"]
+    relevant = ground(model_of(_IDLE), Report(), Limits())
+    assert list(relevant.action_by_name) == ["guarded(a,a)", "guarded(a,b)", "undo(a)"]
+
+
 def test_grounding_twice_gives_the_same() -> None:
     text = _EFFECT.format(effect="(and (p) (q) (r) (s a) (s b) (s c))", init="", metric="")
     first, second = (ground(model_of(text), Report(), Limits()) for _ in range(2))

@@ -91,6 +91,17 @@ def test_an_action_is_kept_for_the_template_that_calls_it() -> None:
     assert task.action_by_name["go(hall)"].factors == (gt.NO_CHANGE,)
 
 
+def test_an_action_that_does_nothing_is_kept_for_the_template_that_calls_it() -> None:
+    task = task_of(
+        """(define (domain d) (:predicates (p) (q)) (:action wait :parameters () :effect (and))
+        (:action act :parameters () :effect (p))
+        (:template go :parameters () :effect (p) :body (sequence (action wait) (condition (p)))))
+        (define (problem x) (:domain d) (:init) (:goal (p)))"""
+    )
+    assert list(task.action_by_name) == ["act()", "wait()"]
+    assert _words(task, task.template_by_name["go()"].body) == "sequence(wait(), p())"
+
+
 def test_a_called_template_is_kept_though_its_own_guide_can_never_apply() -> None:
     text = _DOMAIN.replace(
         "(?o - item ?p - place)\n    :body",
