@@ -76,9 +76,7 @@ class Limits:
         until = time.monotonic() + seconds
         return replace(self, until=until if self.until is None else min(until, self.until))
 
-    def tell(
-        self, doing: str, states: int | None = None, bounds: tuple[float, float] | None = None
-    ) -> None:
+    def tell(self, doing: str, states: int | None = None, bounds: tuple[float, float] | None = None) -> None:
         """Tell the watcher, if there is one, what is being done."""
         if self.watcher is not None:
             self.watcher(Stage(doing, states, bounds))
@@ -92,13 +90,17 @@ class Limits:
             raise self.reached(f"the time limit{seconds} ended {doing}", "--time-limit")
         self.check_memory(doing)
 
+    @property
+    def memory_left(self) -> int | None:
+        """Bytes that this process may still take; None without a bound, or where it cannot be told."""
+        taken = None if self.memory is None else resident_memory()
+        return None if self.memory is None or taken is None else self.memory - taken
+
     def check_memory(self, doing: str, more: int = 0) -> None:
         """Raise :class:`LimitReached` if this process takes too much memory, or would with so many
         bytes more. Where the system does not tell what it takes, nothing is raised."""
-        if self.memory is None:
-            return
-        taken = resident_memory()
-        if taken is not None and taken + more > self.memory:
+        left = self.memory_left
+        if self.memory is not None and left is not None and left < more:
             raise self.reached(
                 f"the limit of {self.memory >> 20} MiB of memory ended {doing}", "--max-memory"
             )

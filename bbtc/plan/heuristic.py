@@ -23,7 +23,7 @@ from bbtc.plan.space_packing import Cube, Packing, Words, bit_test, cubes
 Costs = npt.NDArray[np.float32]
 """Guessed numbers of actions; infinite where the goal is out of reach for sure."""
 
-_CELLS = 1 << 20  # array cells worked on at a time
+_CELLS = 1 << 18  # array cells worked on at a time
 _MOST_CUBES = 32  # disjuncts of one condition; with more, it counts as true
 _FEW = 8  # operators that add a fact, which are gone through one by one
 _DEAREST = 100.0  # an outcome costs no more than this, however improbable

@@ -22,7 +22,9 @@ from bbtc.plan.space_actions import ActionTables, Draw, Index
 from bbtc.plan.space_packing import BitTest, Flags, Packing, Words, bit_test, holds
 from bbtc.plan.space_table import StateTable
 
-_CELLS = 1 << 20  # array cells worked on at a time
+_CELLS = 1 << 19  # array cells worked on at a time
+_EDGE = 400  # bytes that an edge takes, for a word, while it is found
+_LEAST_ROOM = 4 << 20  # bytes of memory without which no state is expanded
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ class Explorer:
         self._edges, self._target, self._draw = _Column(np.int64), _Column(np.int32), _Column(np.int32)
         self.choices = self.edges = 0
         self._most_edges = 1  # of a state, on average over a batch
-        self._step = max(1, _CELLS // (16 * self.tables.width))
+        self._step = max(1, _CELLS // (32 * self.tables.width))
         belief = initial_belief(task)
         numbers = self.table.number(self.packing.split(self.packing.pack(values) for values in belief))
         self.initial = tuple(zip(belief.values(), map(int, numbers), strict=True))
@@ -137,10 +139,8 @@ class Explorer:
             while done < len(numbers):
                 limits.check_states(self.count, "exploration")
                 limits.check_time("exploration", self.count)
-                limits.check_memory("exploration", self.ahead())
-                # Near the limit on states, no more than may be expected to fit.
-                room = max(1, (limits.states - self.count) // self._most_edges)
-                end = min(len(numbers), done + min(self._step, room))
+                limits.check_memory("exploration", self.ahead() + _LEAST_ROOM)
+                end = min(len(numbers), done + min(self._step, self._room(limits)))
                 work = self._expand(numbers[done:end])
                 done = end
                 # As many states at a time as give arrays of some size, whatever their branching.
@@ -149,6 +149,14 @@ class Explorer:
             if not done:
                 raise
         return done
+
+    def _room(self, limits: Limits) -> int:
+        """As many states as may be expected to fit into what the limits leave."""
+        room = (limits.states - self.count) // self._most_edges
+        free = limits.memory_left
+        if free is not None:
+            room = min(room, (free - self.ahead()) // (_EDGE * self.packing.words * self._most_edges))
+        return max(1, room)
 
     def ahead(self) -> int:
         """About how many bytes it will take to make a space of what was found, and to solve it."""
@@ -186,7 +194,7 @@ class Explorer:
         added = int(edges.sum())
         self.edges += added
         self._most_edges = max(self._most_edges, -(-added // len(numbers)))
-        return self.packing.words * (8 * len(numbers) + 4 * len(owner))
+        return self.packing.words * 8 * (len(numbers) + len(owner))
 
     def _with_reference(
         self, states: Words, rows: Index, actions: Index, edges: tuple[Index, Index, Words]
