@@ -6,6 +6,7 @@ import contextlib
 import os
 import pickle
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -29,7 +30,10 @@ def do_all(jobs: Sequence[Job], at_once: int) -> Iterator[Made]:
     this process. A process that dies costs its job, no other. Raises ``KeyboardInterrupt``."""
     at_once = min(at_once, len(jobs))
     if at_once <= 1:
-        yield from map(perform, jobs)
+        for job in jobs:
+            with _interrupted_at_once():
+                made = perform(job)
+            yield made
         return
     waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
     ready: queue.SimpleQueue[Made | BaseException] = queue.SimpleQueue()
@@ -47,6 +51,28 @@ def do_all(jobs: Sequence[Job], at_once: int) -> Iterator[Made]:
     finally:
         for worker in workers:
             worker.end()
+
+
+class _Interrupted(BaseException):
+    """What Ctrl-C raises in place of ``KeyboardInterrupt``, which planners take as a wish for the best tree
+    so far; a build has no use for that."""
+
+
+@contextlib.contextmanager
+def _interrupted_at_once() -> Iterator[None]:
+    def stop(_number: int, _frame: object) -> None:
+        raise _Interrupted
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    except _Interrupted:
+        raise KeyboardInterrupt from None
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class _Worker:
