@@ -6,6 +6,7 @@ usage; 3 a limit stopped the work; 70 internal error; 130 interrupted.
 
 from __future__ import annotations
 
+import gc
 import keyword
 import sys
 from importlib import import_module
@@ -121,6 +122,9 @@ def main() -> None:
             err=True,
         )
         sys.exit(EXIT_INTERNAL)
+    finally:
+        # A task may hold millions of objects, among which the interpreter need not look for cycles now.
+        gc.freeze()
 
 
 if __name__ == "__main__":
