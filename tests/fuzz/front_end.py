@@ -64,7 +64,7 @@ def _limits() -> Limits:
         actions=2_000,
         facts=20_000,
         bindings=200_000,
-        memory=1 << 28,
+        memory=1 << 31,  # that of the whole process, which grows over a long run
         initial_states=64,
     )
 
