@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from bbtc.artefacts import load_tree
 from bbtc.belief.simulate import simulate
 from bbtc.diagnostics import LimitReached
-from bbtc.ground.condition import TRUE, And, Is, Not
+from bbtc.ground.condition import TRUE, And, Is, Known, Not
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.syntax.reader import read_source
@@ -101,6 +101,20 @@ def test_wide_and_deep_trees(kind: str) -> None:
     for root in (wide, deep):
         tree = Tree(coin, root, Fraction(0), Fraction(1), "stuck")
         assert disagreements(tree, solved(solvable_chain(coin, root))) == {}
+
+
+def test_an_action_that_would_not_start_is_not_refused_for_want_of_attempts() -> None:
+    """A guarded action with an unknown precondition is running, whatever its retry node has left."""
+    hide = action("hide", Is(0, Truth.TRUE), ("1", {0: Truth.UNKNOWN}))
+    use = action("use", Is(0, Truth.TRUE), ("1", {}))
+    hidden = task("found", {0: Truth.TRUE}, Is(0, Truth.TRUE), hide, use)
+    first = ControlNode("s", "sequence", (ConditionNode("k", Known(0)), ActionNode("h", "hide()", False)))
+    both = ControlNode("f", "fallback", (first, ActionNode("u", "use()", False, True)))
+    root = ControlNode("r", "retry", (both,), attempts=1)
+    for form, most in FORMS:
+        found = solved(chain_of(hidden, root, form, most))
+        assert (found.blocked, found.failure) == (1, 0)
+        assert disagreements(Tree(hidden, root, Fraction(0), Fraction(1), "stuck"), found) == {}
 
 
 # --- trees that were planned -----------------------------------------------------------------
