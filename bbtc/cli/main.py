@@ -10,6 +10,7 @@ import gc
 import keyword
 import sys
 from importlib import import_module
+from pathlib import Path
 
 import click
 
@@ -65,6 +66,12 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, value: bool)
         ctx.exit()
 
 
+def _print_cmake_dir(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        click.echo(Path(__file__).parents[1] / "cmake")
+        ctx.exit()
+
+
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--version",
@@ -73,6 +80,14 @@ def _print_version(ctx: click.Context, _parameter: click.Parameter, value: bool)
     expose_value=False,
     callback=_print_version,
     help="Print the version.",
+)
+@click.option(
+    "--cmake-dir",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_cmake_dir,
+    help="Print the folder of the CMake package: cmake -Dbbtc_DIR=$(bbtc --cmake-dir).",
 )
 @click.option("--debug", is_flag=True, help="Show a traceback for an internal error.")
 @click.option(

@@ -1,0 +1,10 @@
+# The version of the package "bbtc": that of the program, which find_package compares with what is asked for.
+file(STRINGS "${CMAKE_CURRENT_LIST_DIR}/version.txt" PACKAGE_VERSION LIMIT_COUNT 1)
+if(PACKAGE_VERSION VERSION_LESS PACKAGE_FIND_VERSION)
+  set(PACKAGE_VERSION_COMPATIBLE FALSE)
+else()
+  set(PACKAGE_VERSION_COMPATIBLE TRUE)
+  if(PACKAGE_VERSION VERSION_EQUAL PACKAGE_FIND_VERSION)
+    set(PACKAGE_VERSION_EXACT TRUE)
+  endif()
+endif()
