@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 
 from bbtc import pipeline
 from bbtc.diagnostics import BbtcError
+from bbtc.export.jani import jani, task_text
 from bbtc.export.prism import prism, readable_names, tree_program
 from bbtc.limits import Limits
 from bbtc.tree.nodes import Tree
@@ -150,3 +151,14 @@ def test_verify_is_a_function_of_the_package() -> None:
     import bbtc as package
 
     assert package.verify(soda_tree(), engine="own").problems == ()
+
+
+@pytest.mark.parametrize("form", ["auto", "walk"])
+def test_momba_reads_the_jani_models(form: str) -> None:
+    """Another implementation of the format, which checks the structure and every type."""
+    momba = pytest.importorskip("momba.jani", reason="Momba is not installed: pip install 'bbtc[compare]'")
+    tree = soda_tree()
+    for text in (jani.export(tree, {"form": form}, None), task_text(tree.task)):
+        network = momba.load_model(text)
+        (automaton,) = network.ctx.automata
+        assert len(list(automaton.edges)) == len(json.loads(text)["automata"][0]["edges"])
