@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
+from urllib.parse import quote
 
 from bbtc.codes import CODES
 from bbtc.diagnostics import Diagnostic, Severity
 from bbtc.source import Span
+from bbtc.version import __version__
 
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
@@ -56,7 +59,14 @@ def _as_json(diagnostic: Diagnostic) -> dict[str, object]:
 
 
 def _location(span: Span) -> dict[str, object]:
-    return {"physicalLocation": {"artifactLocation": {"uri": span.source.name}, "region": _region(span)}}
+    place = {"artifactLocation": {"uri": _uri(span.source.name)}, "region": _region(span)}
+    return {"physicalLocation": place}
+
+
+def _uri(name: str) -> str:
+    """The name of a file as a reference: relative, or with a scheme where it is absolute."""
+    path = Path(name)
+    return path.as_uri() if path.is_absolute() else quote(path.as_posix(), safe="/")
 
 
 def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
@@ -69,6 +79,7 @@ def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
                 "tool": {
                     "driver": {
                         "name": "bbtc",
+                        "version": __version__,
                         "rules": [{"id": code, "shortDescription": {"text": CODES[code]}} for code in codes],
                     }
                 },
