@@ -18,7 +18,7 @@ from bbtc.ground.universe import Row
 
 T = TypeVar("T")
 
-CHUNK = 8192
+CHUNK = 2048
 """So many rows are treated together."""
 _MOST_SHARED = 200_000
 """So many distinct values are remembered, which bounds the memory that remembering takes."""

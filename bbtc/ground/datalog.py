@@ -18,7 +18,7 @@ from pathlib import Path
 from bbtc.ground.universe import Row
 from bbtc.limits import Limits
 
-_CHUNK = 1 << 20
+_CHUNK = 1 << 18
 _OUT_OF_MEMORY = 33
 """The exit status of clingo for it."""
 

@@ -117,7 +117,14 @@ class Lowering:
         parts = [part for part in parts if not self._settled(part)]
         names = (name for part in parts for name in free(part))
         used, frame = projection(self.universe, parameters, names)
-        return Shared(used, len(parameters), _Conjunction(self, parts, frame).all)
+        read = tuple(parameters[slot] for slot in used)
+        return Shared(used, len(parameters), _Conjunction(self, parts, read, frame).all)
+
+    def lowered(self, part: mf.Formula, parameters: tuple[Parameter, ...]) -> Shared[Condition]:
+        """:meth:`normal` (strict) for many argument rows."""
+        used, frame = projection(self.universe, parameters, free(part))
+        condition = self.normal(part, frame, strict=True)
+        return Shared(used, len(parameters), lambda rows: [condition(frame.env(row)) for row in rows])
 
     def spend(self, count: int) -> None:
         """Count objects that a quantifier is tried with. Raises at the limit."""
@@ -288,8 +295,14 @@ def _until(end: Condition, parts: Iterable[Condition]) -> list[Condition] | None
 class _Conjunction:
     """The conjunction of some parts in normal form, for many argument rows at once."""
 
-    def __init__(self, lowering: Lowering, parts: Sequence[mf.Formula], frame: Frame) -> None:
-        self._columns = []
+    def __init__(
+        self,
+        lowering: Lowering,
+        parts: Sequence[mf.Formula],
+        parameters: tuple[Parameter, ...],
+        frame: Frame,
+    ) -> None:
+        self._columns: list[Callable[[list[Row]], list[Condition]]] = []
         # Of what value each column is, if it is of nothing but literals of one predicate.
         self._kinds: list[tuple[str, Truth] | None] = []
         for part in parts:
@@ -303,7 +316,7 @@ class _Conjunction:
                     plain = all(type(leaf) is Is for leaf in leaves.values())
                     self._kinds.append((predicate, value) if plain else None)
                 case _:
-                    self._columns.append(_column(lowering.normal(part, frame, strict=True), frame))
+                    self._columns.append(lowering.lowered(part, parameters).all)
                     self._kinds.append(None)
         self._alike = [
             (one, other)
@@ -337,10 +350,6 @@ def _leaf_column(
     return lambda rows: list(map(get, read(rows), repeat(other)))
 
 
-def _column(lowered: Lowered, frame: Frame) -> Callable[[list[Row]], list[Condition]]:
-    return lambda rows: [lowered(frame.env(row)) for row in rows]
-
-
 def conjoin(parts: list[Condition]) -> Condition:
     """:func:`bbtc.ground.condition.conjunction` of parts that are no constants; leaves, which are
     shared, are told apart by identity, which is faster."""
@@ -348,10 +357,14 @@ def conjoin(parts: list[Condition]) -> Condition:
         return TRUE
     if len(parts) == 1:
         return parts[0]
+    unique: dict[int, Condition] = {}
     for part in parts:
-        if type(part) is not Is:
+        if type(part) is Is:
+            unique[id(part)] = part
+        elif type(part) is And and all(type(each) is Is for each in part.parts):
+            unique.update(zip(map(id, part.parts), part.parts, strict=True))
+        else:
             return conjunction(parts)
-    unique = {id(part): part for part in parts}
     return And(tuple(unique.values())) if len(unique) > 1 else parts[0]
 
 

@@ -46,6 +46,7 @@ def main() -> int:
     """Print a line for each pair, and the means."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--actions", type=int, default=10_000, help="smallest number of ground actions")
+    parser.add_argument("--most", type=int, default=10_000_000, help="largest number of ground actions")
     parser.add_argument("--only", default="", help="pairs whose path holds this")
     parser.add_argument("--each", type=int, default=1000, help="most pairs of one domain")
     parser.add_argument("--timeout", type=float, default=300, help="seconds for one run")
@@ -62,7 +63,7 @@ def main() -> int:
             continue
         try:
             ours = run_bbtc("instantiate", domain, problem, options.timeout)
-            if "error" in ours or ours["actions"] < options.actions:
+            if "error" in ours or not options.actions <= ours["actions"] <= options.most:
                 continue
             theirs = downward.explore(domain, problem, timeout=options.timeout)
         except subprocess.SubprocessError as error:
