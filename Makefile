@@ -28,7 +28,7 @@ demo: .venv/demo/.installed
 	@mkdir -p $(OUT)
 	$(BBTC) check $(DOMAIN) $(PROBLEM)
 	$(BBTC) compile $(DOMAIN) $(PROBLEM) -o $(OUT)/task.json
-	$(BBTC) plan $(DOMAIN) $(PROBLEM) -o $(OUT)/tree.json
+	$(BBTC) plan $(DOMAIN) $(PROBLEM) --strategy refine -o $(OUT)/tree.json
 	$(BBTC) simulate $(OUT)/tree.json
 	$(BBTC) export $(OUT)/tree.json --to dot -o $(OUT)/tree.dot
 	$(BBTC) export $(OUT)/tree.json --to svg -o $(OUT)/tree.svg

@@ -47,7 +47,7 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option(
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
-@click.option("--strategy", default=DEFAULT, show_default=True, help="How to plan: refine, policy or auto.")
+@click.option("--strategy", default=DEFAULT, show_default=True, help="refine, search, policy or auto.")
 @click.option("--max-actions", type=click.IntRange(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",
@@ -134,7 +134,7 @@ def run_planner(
     quiet: bool,
 ) -> Plan:
     """Plan, telling the session each refinement as it is made and how planning ended."""
-    from bbtc.cli.bounds_report import bounds_lines, dead_end_line
+    from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
     from bbtc.cli.wording import exact, plan_summary, refinement_line
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
@@ -164,8 +164,8 @@ def run_planner(
         )
     for line in [*plan_summary(plan), *bounds_lines(plan.tree)]:
         session.say(line)
-    for end in dead_ends(plan.tree, replace(limits, seconds=None)):
-        session.say(dead_end_line(end))
+    for line in dead_end_lines(dead_ends(plan.tree, replace(limits, seconds=None))):
+        session.say(line)
     return plan
 
 

@@ -1,5 +1,13 @@
-"""The strategy ``auto``: the smallest tree found that reaches the target and, among those, the
-cheapest; where none does, the one with the greatest success probability."""
+"""The strategy ``auto``: the smallest tree found that reaches the target and, among those, the cheapest;
+where none does, the one with the greatest success probability.
+
+1. Search over refinements: it takes time with the size of the tree, not of the task.
+2. Write down an optimal policy. Where a tree that reaches the target is known already, only if the actions
+   and states of the task are few; else as the limits allow, since the policy tells whether the target can
+   be reached.
+3. Refine greedily, as published, in as many nodes as would make a smaller tree than those found; of
+   a task with many actions, again, only where the target was not reached.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +20,15 @@ from bbtc.limits import Limits
 from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.policy import plan_policy
 from bbtc.plan.refine import refine
-from bbtc.plan.result import Plan, Progress
-from bbtc.tree.nodes import walk
+from bbtc.plan.result import Plan, Progress, Refinement
+from bbtc.plan.search import plan_search
+from bbtc.plan.simplify import size
+
+MANY_ACTIONS = 500
+"""A task with more gets no second opinion once a tree reaches the target."""
+
+_STATES_AND_ACTIONS = 200_000
+"""For a second opinion, states times actions of the task are explored up to this number."""
 
 _REFINE_STATES = 20_000
 """States of one simulation while refining for a second opinion."""
@@ -22,49 +37,79 @@ _REFINE_STATES = 20_000
 def plan_auto(
     task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = DEFAULTS
 ) -> Plan:
-    """Plan by policy synthesis and by refinement, and keep the better tree. Always returns; each
-    refinement is told to ``progress`` only if its tree is kept."""
-    synthesized = plan_policy(task, target, limits, progress, options)
-    if synthesized.tree.status == "interrupted" or options.max_actions is not None:
-        return synthesized
-    tree = synthesized.tree
-    most_nodes = limits.nodes
-    if tree.success_probability >= target:
-        most_nodes = min(most_nodes, _size(synthesized) - 1)  # a larger tree would not be kept
-    elif tree.bounds is not None and tree.success_probability == tree.bounds[1]:
-        return synthesized  # nothing can do better
-    narrow = replace(limits, nodes=max(1, most_nodes), states=min(limits.states, _REFINE_STATES))
-    try:
-        refined = refine(task, target, narrow, lambda _: None)
-    except LimitReached:  # not even the goal alone is small enough
-        return synthesized
-    if _rank(refined) >= _rank(synthesized):
-        return synthesized
-    for step in refined.refinements:
+    """Plan by search, by policy synthesis and by refinement, and keep the best tree. Always returns;
+    refinements are told to ``progress`` only if their tree is kept. Raises
+    :class:`bbtc.diagnostics.LimitReached` only if the limits do not even allow the simulation of the
+    initial belief."""
+    if options.max_actions is not None:
+        return plan_policy(task, target, limits, progress, options)
+    plans = [plan_search(task, target, limits, _silent, options)]
+    if plans[0].tree.status != "interrupted":
+        second = _policy(task, target, limits, options, plans[0])
+        plans.extend([] if second is None else [second])
+        if all(plan.tree.status != "interrupted" for plan in plans):
+            third = _refine(task, target, limits, min(plans, key=_rank))
+            plans.extend([] if third is None else [third])
+    kept = min(plans, key=_rank)
+    for step in kept.refinements:
         progress(step)
-    return _with_bounds(refined, synthesized)
+    return _with_findings(kept, plans)
 
 
-def _size(plan: Plan) -> int:
-    return sum(1 for _ in walk(plan.tree.root))
+def _silent(step: Refinement) -> None:
+    del step
 
 
-def _rank(plan: Plan) -> tuple[int, Fraction, int, bool, Fraction]:
+def _policy(task: Task, target: Fraction, limits: Limits, options: Options, known: Plan) -> Plan | None:
+    if known.tree.status != "target-reached":
+        return plan_policy(task, target, limits, _silent, options)
+    if size(known.tree.root) == 1 or len(task.actions) > MANY_ACTIONS:
+        return None
+    few = max(1, min(limits.states, _STATES_AND_ACTIONS // max(1, len(task.actions))))
+    try:
+        found = plan_policy(task, target, replace(limits, states=few), _silent, options, whole=True)
+    except LimitReached:  # more states than that
+        return None
+    return found
+
+
+def _refine(task: Task, target: Fraction, limits: Limits, best: Plan) -> Plan | None:
+    tree = best.tree
+    most = limits.nodes
+    if tree.status == "target-reached":
+        most = min(most, size(tree.root) - 1)  # a larger tree would not be kept
+        if len(task.actions) > MANY_ACTIONS:
+            return None
+    elif tree.bounds is not None and tree.success_probability == tree.bounds[1]:
+        return None  # nothing can do better
+    if most < 1:
+        return None
+    try:
+        return refine(
+            task, target, replace(limits, nodes=most, states=min(limits.states, _REFINE_STATES)), _silent
+        )
+    except LimitReached:  # not even the goal alone is small enough
+        return None
+
+
+def _rank(plan: Plan) -> tuple[bool, Fraction, int, bool, Fraction]:
     """Sort key, best first."""
     tree, cost = plan.tree, plan.figures.cost
     reached = tree.success_probability >= tree.target
     missing = Fraction(0) if reached else -tree.success_probability
-    return (not reached, missing, _size(plan), cost is None, cost or Fraction(0))
+    return (not reached, missing, size(tree.root), cost is None, cost or Fraction(0))
 
 
-def _with_bounds(kept: Plan, other: Plan) -> Plan:
-    """The plan with the bounds that the other one brought to light."""
-    if other.tree.bounds is None:
+def _with_findings(kept: Plan, plans: list[Plan]) -> Plan:
+    """The plan with what the others brought to light: bounds, and what stopped them."""
+    tree = kept.tree
+    known = [plan.tree.bounds for plan in plans if plan.tree.bounds is not None]
+    if not known:
         return kept
-    lower, upper = other.tree.bounds
-    lower = max(lower, kept.tree.success_probability)
-    status = kept.tree.status
+    lower = max(tree.success_probability, *(bounds[0] for bounds in known))
+    upper = max(lower, min(bounds[1] for bounds in known))
+    status = tree.status
     if status == "stuck":
-        status = "out-of-reach" if upper < kept.tree.target else other.tree.status
-    tree = replace(kept.tree, bounds=(lower, max(lower, upper)), status=status)
-    return replace(kept, tree=tree, stop=kept.stop or other.stop)
+        status = "out-of-reach" if upper < tree.target else "limit-reached"
+    stop = kept.stop or next((plan.stop for plan in plans if plan.stop is not None), None)
+    return replace(kept, tree=replace(tree, bounds=(lower, upper), status=status), stop=stop)

@@ -11,21 +11,25 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from bbtc.belief.chain import explore
-from bbtc.belief.simulate import simulate
+from bbtc.belief.simulate import Figures, simulate
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.policy_budget import phases
-from bbtc.plan.policy_retry import longest_run, with_least_attempts
-from bbtc.plan.policy_space import best_offers
+from bbtc.plan.policy_retry import longest_run
+from bbtc.plan.policy_space import best_offers, likely_offers
 from bbtc.plan.result import Plan, Progress
-from bbtc.plan.simplify import numbered, size
-from bbtc.plan.space import explore_space
+from bbtc.plan.shrink import finished, shrunk
+from bbtc.plan.simplify import numbered, simplified, size
 from bbtc.plan.synthesis_tree import in_phases, synthesize
-from bbtc.plan.value import Bounds, best_probability, reachability
-from bbtc.plan.value_horizon import horizon_values
+from bbtc.plan.value import Bounds
+from bbtc.plan.value_best import best_known, best_within
 from bbtc.tree.nodes import ConditionNode, Node, Status, Tree
+
+_BEFORE_TREE = 0.6  # of the time, for all that comes before a tree
+_DRAFTS = (50, 1000)  # states of a larger policy that a tree is made of first, to fall back on
+_GRACE = 0.5  # seconds to make a tree of what is known once the user interrupts
 
 
 @dataclass(slots=True)
@@ -37,6 +41,8 @@ class _Search:
     limits: Limits
     options: Options
     root: Node
+    figures: Figures
+    whole: bool = False
     bounds: Bounds = field(default_factory=lambda: Bounds(Fraction(0), Fraction(1)))
     stop: Diagnostic | None = None
     interrupted: bool = False
@@ -54,33 +60,41 @@ class _Search:
             self.interrupted = True
 
     def _without_end(self) -> None:
-        space = explore_space(self.task, self.limits)
-        self.stop = space.stop
-        found = reachability(space, self.limits)
-        self.bounds = found.initial if space.complete else best_probability(space, self.limits)
-        offers, _ = best_offers(found, self.limits)
-        self._keep(synthesize(self.task, offers, self.limits))
-        if self.options.retries == "least" and found.initial.upper > self.target:
-            self._keep(numbered(with_least_attempts(self.task, self.root, self.target, self.limits)))
+        best = best_known(self.task, self.limits.part(_BEFORE_TREE), self.target, whole=self.whole)
+        self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
+        limits = self.limits.within(_GRACE) if best.interrupted else self.limits
+        for most in _DRAFTS:
+            draft = likely_offers(best.found, most)
+            if draft is None:
+                break
+            self._keep(synthesize(self.task, draft, limits), limits)
+        offers, _ = best_offers(best.found, limits)
+        self._keep(synthesize(self.task, offers, limits), limits)
+        self._keep(finished(self.task, self.root, self.target, limits, self.options), limits)
 
     def _within(self, steps: int) -> None:
-        space = explore_space(self.task, self.limits, steps)
-        self.stop = space.stop
-        horizon = horizon_values(space, steps, self.limits)
-        if self.stop is None:
-            self.bounds = horizon.initial[-1]
+        best = best_within(self.task, self.limits.part(_BEFORE_TREE), steps)
+        self.bounds, self.stop, horizon = best.bounds, best.stop, best.horizon
         parts = phases(horizon, self.limits)
+        done = False
         if len(parts) == 1:
             root = synthesize(self.task, parts[0].offers, self.limits)
             longest = longest_run(explore(self.task, root, self.limits))
             if longest is not None and longest <= steps:
                 self._keep(root)
-                return
-        self._keep(in_phases(self.task, [(part.steps, part.offers) for part in parts], self.limits))
+                done = True
+        if not done:
+            self._keep(in_phases(self.task, [(part.steps, part.offers) for part in parts], self.limits))
+        simple = simplified(self.task, self.root, self.limits)
+        self._keep(numbered(shrunk(self.task, simple, self.target, self.limits)))
 
-    def _keep(self, root: Node) -> None:
-        self.limits.check_nodes(size(root))
-        self.root = root
+    def _keep(self, root: Node, limits: Limits | None = None) -> None:
+        """Take a tree for the best so far, unless it does worse and does not reach the target."""
+        limits = limits or self.limits
+        limits.check_nodes(size(root))
+        found = simulate(self.task, root, limits)
+        if found.success >= min(self.target, self.figures.success):
+            self.root, self.figures = root, found
 
 
 def plan_policy(
@@ -89,14 +103,19 @@ def plan_policy(
     limits: Limits,
     progress: Progress,  # noqa: ARG001
     options: Options = DEFAULTS,
+    *,
+    whole: bool = False,
 ) -> Plan:
     """Plan by policy synthesis. Always returns; where a limit is reached, with the best that is known
-    by then."""
+    by then. Only with ``whole`` it raises ``LimitReached`` instead where the task has more states than
+    the limit."""
     goal: Node = numbered(ConditionNode("", task.goal))
     initial = simulate(task, goal, limits)
-    search = _Search(task, target, limits, options, goal)
+    search = _Search(task, target, limits, options, goal, initial, whole)
     search.run()
-    figures = simulate(task, search.root, Limits())
+    if whole and search.stop is not None:
+        raise LimitReached([search.stop])
+    figures = search.figures
     lower = max(search.bounds.lower, figures.success)
     upper = max(search.bounds.upper, lower)
     status: Status = "limit-reached"

@@ -9,6 +9,7 @@ from bbtc.belief.absorption import components
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import figures
 from bbtc.belief.soundness import violations
+from bbtc.belief.tick import Status
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -74,8 +75,14 @@ def _least(task: Task, root: Node, place: str, target: Fraction, limits: Limits)
         chain = explore(task, tree, limits)
         return None if violations(task, chain) else figures(task, tree, chain).success
 
-    least, most = 0, 1
+    least = 0
+    most = _expected_attempts(task, root, target, limits) if place == root.id else 1
     try:
+        if most > 1:  # very likely the number itself
+            reached = success(most - 1)
+            if reached is None:
+                return None
+            least, most = (0, most - 1) if reached >= target else (most - 1, most)
         while True:
             reached = success(most)
             if reached is None:
@@ -94,6 +101,31 @@ def _least(task: Task, root: Node, place: str, target: Fraction, limits: Limits)
     except LimitReached:
         return None
     return _wrapped(root, place, most)
+
+
+def _expected_attempts(task: Task, root: Node, target: Fraction, limits: Limits) -> int:
+    """The least number of actions within which the tree succeeds with the target probability; this
+    is the number of attempts to ask for at the root, but for odd trees. 1 if there is none."""
+    chain = explore(task, root, limits)
+    mass: dict[int, Fraction] = {}
+    for probability, state in chain.initial:
+        mass[state] = mass.get(state, Fraction(0)) + probability
+    won = Fraction(0)
+    for steps in range(_MOST_ATTEMPTS):
+        following: dict[int, Fraction] = {}
+        for state, probability in mass.items():
+            if chain.status[state] is Status.SUCCESS:
+                won += probability
+            for edge in chain.edges[state]:
+                share = probability * edge.result.probability
+                following[edge.target] = following.get(edge.target, Fraction(0)) + share
+        if won >= target:
+            return max(1, steps)
+        if not following:
+            break
+        limits.check_time("the search for a number of attempts")
+        mass = following
+    return 1
 
 
 def _wrapped(node: Node, place: str, attempts: int) -> Node:

@@ -6,6 +6,8 @@ Fallback, one that is unknown an observation under a Skipper, with the precondit
 conditions of their own. Actions are not latched, so a tree tries again by itself. Where the paper commits
 to the best refinement, this searches (limited discrepancies: Harvey, Ginsberg 1995):
 
+Of a small task the search first finds what any policy can reach, and looks for no more than that.
+
 1. Simulate the tree. Final states that fail from which the goal is possible in the delete relaxation
    can still be repaired, and circles broken: what these weigh together with the success so far bounds
    what the refinements of this tree can reach.
@@ -39,12 +41,13 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.plan.draft import Attempt, Draft, Frozen, Subgoal, freeze, new_attempt
 from bbtc.plan.options import DEFAULTS, Options
-from bbtc.plan.policy_retry import with_least_attempts
 from bbtc.plan.relaxed import possible
 from bbtc.plan.result import Plan, Progress, Refinement
 from bbtc.plan.search_moves import Insertion, Move, Moves, forward, separating
-from bbtc.plan.shrink import shrunk
-from bbtc.plan.simplify import numbered, simplified, size
+from bbtc.plan.shrink import finished
+from bbtc.plan.simplify import size
+from bbtc.plan.space import explore_space
+from bbtc.plan.value import reachability
 from bbtc.tree.nodes import Node, Tree
 from bbtc.tree.nodes import Status as PlanStatus
 
@@ -53,6 +56,12 @@ MOST_TREES = 400
 
 MOST_STATES = 100_000
 """States of all simulations of one search together."""
+
+FEW_ACTIONS = 100
+"""For a task with no more, the search first asks what any policy can reach, and looks for no more."""
+
+_FEW_STATES = 2_000
+"""States explored for that."""
 
 _BRANCHES = 5
 """Refinements of a tree that are considered."""
@@ -287,6 +296,19 @@ def _form(draft: Draft) -> tuple[object, ...]:
     return tuple(map(of, draft.goals))
 
 
+def possible_target(task: Task, target: Fraction, limits: Limits) -> Fraction:
+    """The target, or the best that any policy can do where that is less and known with little effort."""
+    if len(task.actions) > FEW_ACTIONS:
+        return target
+    try:
+        space = explore_space(task, replace(limits, states=min(limits.states, _FEW_STATES)))
+        if space.complete:
+            return min(target, reachability(space, limits).initial.upper)
+    except LimitReached:
+        limits.check_time("planning")
+    return target
+
+
 def plan_search(
     task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = DEFAULTS
 ) -> Plan:
@@ -304,6 +326,7 @@ def plan_search(
     stop: Diagnostic | None = None
     root: Node = start
     try:
+        search.target = possible_target(task, target, limits)
         search.run()
     except LimitReached as reached:
         status, stop = "limit-reached", reached.diagnostics[0]
@@ -324,21 +347,3 @@ def plan_search(
     for step in steps:
         progress(step)
     return Plan(Tree(task, root, figures.success, target, status), figures, initial.success, steps, stop)
-
-
-def finished(
-    task: Task,
-    root: Node,
-    target: Fraction,
-    limits: Limits,
-    options: Options,
-    *,
-    transitions: dict[str, Transition] | None = None,
-) -> Node:
-    """The tree without what its runs, or the target, do not need, and with as many attempts as the
-    options say. Raises ``LimitReached``."""
-    root = simplified(task, root, limits, transitions)
-    root = shrunk(task, root, target, limits, transitions)
-    if options.retries == "least":
-        root = with_least_attempts(task, root, target, limits)
-    return numbered(root)

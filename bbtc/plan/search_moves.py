@@ -140,14 +140,16 @@ class Moves:
         facts = self.relaxed.facts(values)
         plans = {c: _Plan(self, c, facts, values) for c in waiting}
         uncertain = {c: any(self.task.variables[v].three_valued for v in variables(c)) for c in waiting}
+        trouble = {(a, b): plans[a].trouble_before(plans[b]) for a in waiting for b in waiting if a is not b}
         found: list[Condition] = []
         while waiting:
             # How many of the others would rather come before; in doubt, as declared.
-            before = [
-                (sum(_first(plans[o], plans[c]) for o in waiting if o is not c), not uncertain[c], i)
-                for i, c in enumerate(waiting)
-            ]
-            found.append(waiting.pop(min(before)[2]))
+            before = [sum(trouble[o, c] < trouble[c, o] for o in waiting if o is not c) for c in waiting]
+            first = min(
+                range(len(waiting)),
+                key=lambda i: (before[i], not uncertain[waiting[i]], i),
+            )
+            found.append(waiting.pop(first))
         return tuple(found)
 
 
@@ -157,6 +159,7 @@ class _Plan:
     def __init__(self, moves: Moves, condition: Condition, facts: Facts, values: Values) -> None:
         relaxed = moves.relaxed
         costs = relaxed.operator_costs(facts)
+        self.moves = moves
         self.condition = condition
         self.sets: set[tuple[int, Truth]] = set()
         self.needs: set[tuple[int, Truth]] = set()
@@ -187,10 +190,29 @@ class _Plan:
         against = set(_literals(negation(condition)))
         return not against.isdisjoint(self.sets)
 
-    def takes_from(self, other: _Plan) -> bool:
-        """Does it undo something of the state that the other one builds on?"""
+    def trouble_before(self, other: _Plan) -> int:
+        """How bad is it to carry this plan out before the other? 3: the other makes this condition false
+        again; 2: this takes what the other builds on, which only comes back at the expense of this
+        condition; 1: this takes what the other builds on; 0: not at all."""
+        if not set(_literals(negation(self.condition))).isdisjoint(other.sets):
+            return 3
         kept = dict(other.needs)
-        return any(kept.get(variable, value) is not value for variable, value in self.sets)
+        taken = [v for v, value in sorted(self.sets) if kept.get(v, value) is not value]
+        if any(self._costs_own(variable, kept[variable]) for variable in taken):
+            return 2
+        return int(bool(taken))
+
+    def _costs_own(self, variable: int, value: Truth) -> bool:
+        """Does some action that sets the variable need this plan's condition, and end it?"""
+        own = set(_literals(self.condition))
+        against = set(_literals(negation(self.condition)))
+        for number in self.moves.relaxed.makers(variable, value).tolist():
+            operator = self.moves.relaxed.operators[number]
+            if operator.action >= 0 and not against.isdisjoint(operator.sets):
+                needed = self.moves.task.actions[operator.action].precondition
+                if not own.isdisjoint(_literals(needed)):
+                    return True
+        return False
 
 
 def _literals(condition: Condition) -> Iterator[tuple[int, Truth]]:
@@ -202,13 +224,6 @@ def _literals(condition: Condition) -> Iterator[tuple[int, Truth]]:
                 yield from _literals(part)
         case _:
             return
-
-
-def _first(one: _Plan, other: _Plan) -> bool:
-    """Should the one condition be achieved before the other?"""
-    if one.harms(other.condition) != other.harms(one.condition):
-        return one.harms(other.condition)
-    return other.takes_from(one) and not one.takes_from(other)
 
 
 # --- moves -----------------------------------------------------------------------------------

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bbtc.belief.absorption import Absorption
-from bbtc.belief.chain import explore
+from bbtc.belief.chain import Chain, explore
 from bbtc.belief.soundness import violations
 from bbtc.belief.state import Transition
 from bbtc.belief.tick import Status
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.plan.simplify import simplified, size
+from bbtc.plan.options import Options
+from bbtc.plan.policy_retry import with_least_attempts
+from bbtc.plan.simplify import numbered, simplified, size
 from bbtc.tree.nodes import ControlNode, Node, actions_of
 
 _MOST_STATES = 50_000
@@ -26,14 +28,14 @@ def shrunk(
 ) -> Node:
     """The tree without those alternatives of its Fallbacks that the target does not need: one after
     the other is dropped, the largest first, as long as the exact success probability stays at the
-    target or above (or, where the tree falls short of it, stays what it is). What is left is simplified.
+    target or above. Where the tree does no better than that from the start, neither success nor expected
+    cost may get worse. What is left is simplified.
     Raises ``LimitReached`` when the time is over.
     """
     transitions = {} if transitions is None else transitions
     chain = explore(task, root, limits, transitions)
     work = len(chain.states)
-    success, endless = _outcome(Absorption(chain))
-    wanted = min(target, success)
+    before = _Worth.of(chain)
     dropped = True
     while dropped:
         dropped = False
@@ -41,29 +43,46 @@ def shrunk(
             limits.check_time("the search for a small tree")
             if work > _MOST_STATES:
                 return root
+            narrow = replace(limits, states=min(limits.states, 4 * len(chain.states)))
             try:
-                chain = explore(
-                    task, smaller, replace(limits, states=min(limits.states, 4 * work)), transitions
-                )
+                other = explore(task, smaller, narrow, transitions)
             except LimitReached:
                 continue
-            work += len(chain.states)
-            reached, circling = _outcome(Absorption(chain))
-            if reached >= wanted and circling <= endless and not violations(task, chain):
+            work += len(other.states)
+            if _Worth.of(other).will_do(before, target) and not violations(task, other):
                 root = simplified(task, smaller, limits, transitions)
                 dropped = True
                 break
     return root
 
 
-def _outcome(absorption: Absorption) -> tuple[Fraction, Fraction]:
-    """Probabilities of success, and of never ending."""
-    chain = absorption.chain
-    visits = absorption.visits()
-    won = sum(
-        (visits[s] or Fraction(0) for s in chain.final if chain.status[s] is Status.SUCCESS), Fraction(0)
-    )
-    return won, 1 - sum((visits[s] or Fraction(0) for s in chain.final), Fraction(0))
+@dataclass(frozen=True, slots=True)
+class _Worth:
+    """Probabilities of success and of never ending, and the expected cost (None: infinite)."""
+
+    success: Fraction
+    endless: Fraction
+    cost: Fraction | None
+
+    @classmethod
+    def of(cls, chain: Chain) -> _Worth:
+        visits = Absorption(chain).visits()
+        ends = {status: Fraction(0) for status in Status}
+        for state in chain.final:
+            ends[chain.status[state]] += visits[state] or 0
+        endless = 1 - sum(ends.values(), Fraction(0))
+        cost = Fraction(0)
+        for visit, edges in zip(visits, chain.edges, strict=True):
+            cost += (visit or 0) * sum((e.result.probability * e.result.cost for e in edges), Fraction(0))
+        return cls(ends[Status.SUCCESS], endless, None if endless else cost)
+
+    def will_do(self, before: _Worth, target: Fraction) -> bool:
+        """Is it good enough in place of what was before?"""
+        if self.endless > before.endless or self.success < min(before.success, target):
+            return False
+        if before.success > target or before.cost is None:
+            return True
+        return self.cost is not None and self.cost <= before.cost
 
 
 def _without_one(node: Node) -> Iterator[Node]:
@@ -76,3 +95,22 @@ def _without_one(node: Node) -> Iterator[Node]:
             yield rest[0] if len(rest) == 1 else replace(node, children=rest)
         for smaller in _without_one(child):
             yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))
+
+
+def finished(
+    task: Task,
+    root: Node,
+    target: Fraction,
+    limits: Limits,
+    options: Options,
+    *,
+    transitions: dict[str, Transition] | None = None,
+) -> Node:
+    """The tree without what its runs, or the target, do not need, and with as many attempts as the
+    options say. Raises ``LimitReached``."""
+    root = simplified(task, root, limits, transitions)
+    root = shrunk(task, root, target, limits, transitions)
+    worth = _Worth.of(explore(task, root, limits, transitions))
+    if options.retries == "least" and worth.success > target:
+        root = with_least_attempts(task, root, target, limits)
+    return numbered(root)

@@ -21,6 +21,7 @@ from bbtc.belief.chain import Chain, explore
 from bbtc.belief.same_runs import same_runs
 from bbtc.belief.state import Transition
 from bbtc.belief.tick import Status, compile_tick
+from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
@@ -32,8 +33,11 @@ GOES_ON: dict[ControlKind, Status] = {
 }
 """After which status of a child a control node ticks the next one."""
 
-_MOST_PAIRS = 200
-"""Shared copies that are tried."""
+_MOST_TICKS = 200_000
+"""Ticks spent on trying merged trees, each time."""
+
+_MOST_STATES = 20_000
+"""A tree with more states is left as it is."""
 
 
 def simplified(
@@ -41,7 +45,11 @@ def simplified(
 ) -> Node:
     """The tree made smaller, its runs unchanged. Raises ``LimitReached``; ``AssertionError`` if what
     was found does something else, which is a bug."""
-    chain = explore(task, root, limits, transitions)
+    try:
+        chain = explore(task, root, replace(limits, states=min(limits.states, _MOST_STATES)), transitions)
+    except LimitReached:
+        limits.check_time("the search for a small tree")
+        return root
     found = root
     while True:
         smaller = _without_idle(
@@ -121,7 +129,7 @@ def _shared(task: Task, root: Node, chain: Chain, limits: Limits) -> Node | None
     """Step 2, once: the first smaller tree that does the same; None if there is none."""
     for tried, smaller in enumerate(_merged(root)):
         limits.check_time("the search for a small tree")
-        if tried == _MOST_PAIRS:
+        if tried * len(chain.states) > _MOST_TICKS:
             break
         if same_runs(task, chain, smaller):
             return numbered(smaller)

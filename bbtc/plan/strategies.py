@@ -19,7 +19,7 @@ STRATEGIES = {
 }
 """Module and function of each strategy, imported when used."""
 
-DEFAULT = "refine"
+DEFAULT = "auto"
 
 
 def run_strategy(

@@ -1,5 +1,5 @@
 ; Seven shifts in ten leave a half full battery, the others a low one; then the lobby is to be
-; patrolled. The robot knows which it is, but the plan has to be made before.
+; patrolled, and in the end the robot is to stand in its dock, in contact. The robot knows which it is, but the plan has to be made before.
 (define (problem after-a-shift)
   (:domain charging)
   (:objects
@@ -10,7 +10,7 @@
     (probabilistic
       0.7 (battery half)
       0.3 (battery low)))
-  (:goal (patrolled lobby))
+  (:goal (and (patrolled lobby) (docked)))
   (:goal-probability 0.95)
   (:goal-reward 50)
   (:metric maximize (reward)))

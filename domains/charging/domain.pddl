@@ -45,8 +45,8 @@
   (:action check_charger
     :precondition (and (exists (?dock - dock) (at ?dock)) (unknown (docked)))
     :effect (probabilistic
-      3/5 (docked)
-      2/5 (not (docked))))
+      0.8 (docked)
+      0.2 (not (docked))))
 
   (:action charge
     :precondition (docked)

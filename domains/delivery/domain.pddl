@@ -68,7 +68,7 @@
   (:template deliver
     :parameters (?thing - thing ?to - person ?desk - desk)
     :precondition (and (carrying ?thing) (addressed ?thing ?to) (sits_at ?to ?desk))
-    :effect (probabilistic 0.7 (handed ?thing ?to))
+    :effect (probabilistic 0.76 (handed ?thing ?to))
     :body (sequence
       (fallback (condition (at ?desk)) (go_to ?desk))
       (condition (at ?desk))              ; the way there may have been blocked

@@ -4,8 +4,9 @@
 (define (domain service-robot)
   (:requirements :typing :negative-preconditions :universal-effects :disjunctive-preconditions
                  :equality :conditional-effects :probabilistic-effects :unknown)
-  (:types surface container appliance - furniture
-          item furniture)
+  (:types
+    surface container appliance - furniture
+    item furniture)
 
   (:predicates
     (near ?spot - furniture)
@@ -22,8 +23,9 @@
     :parameters (?to - furniture)
     :precondition (not (near ?to))
     :effect (probabilistic
-      0.98 (and (near ?to)
-                (forall (?other - furniture) (when (not (= ?other ?to)) (not (near ?other)))))))
+      0.98 (and
+        (near ?to)
+        (forall (?other - furniture) (when (not (= ?other ?to)) (not (near ?other)))))))
 
   (:action open
     :parameters (?spot - container)
@@ -32,25 +34,34 @@
 
   (:action look_for
     :parameters (?item - item ?spot - furniture)
-    :precondition (and (near ?spot) (fits ?item ?spot) (unknown (at ?item ?spot))
-                       (or (not (has_door ?spot)) (open ?spot)))
+    :precondition (and
+      (near ?spot)
+      (fits ?item ?spot)
+      (unknown (at ?item ?spot))
+      (or (not (has_door ?spot)) (open ?spot)))
     :effect (probabilistic
       3/4 (at ?item ?spot)
       1/4 (not (at ?item ?spot))))
 
   (:action pick
     :parameters (?item - item ?spot - furniture)
-    :precondition (and (near ?spot) (fits ?item ?spot) (at ?item ?spot) (hand_free)
-                       (or (not (has_door ?spot)) (open ?spot)))
+    :precondition (and
+      (near ?spot)
+      (fits ?item ?spot)
+      (at ?item ?spot)
+      (hand_free)
+      (or (not (has_door ?spot)) (open ?spot)))
     :effect (probabilistic
       0.9 (and (holding ?item) (not (hand_free)) (not (at ?item ?spot)))))
 
   (:action place
     :parameters (?item - item ?spot - furniture)
-    :precondition (and (near ?spot) (fits ?item ?spot) (holding ?item)
-                       (or (not (has_door ?spot)) (open ?spot)))
-    :effect (probabilistic
-      0.95 (and (at ?item ?spot) (hand_free) (not (holding ?item)))))
+    :precondition (and
+      (near ?spot)
+      (fits ?item ?spot)
+      (holding ?item)
+      (or (not (has_door ?spot)) (open ?spot)))
+    :effect (probabilistic 0.95 (and (at ?item ?spot) (hand_free) (not (holding ?item)))))
 
   ; There is no other hand: what the robot holds has to be put down first.
   (:action switch_on

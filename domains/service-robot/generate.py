@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from pathlib import Path
 
 SURFACES = ("table", "shelf", "counter", "desk", "windowsill")
 CONTAINERS = ("fridge", "cupboard", "drawer", "wardrobe")
@@ -78,15 +79,20 @@ def _lines(
 
 
 def main() -> None:
-    """Print a problem."""
+    """Print or write a problem."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("items", type=int)
     parser.add_argument("places", type=int, help="pieces of furniture each item may stand on")
     parser.add_argument("--goals", type=int, default=3)
     parser.add_argument("--furniture", type=int, help="pieces of furniture; default: a fifth of the items")
     parser.add_argument("--target", default="0.9")
+    parser.add_argument("-o", "--output", type=Path, help="where to write it; default: standard output")
     given = parser.parse_args()
-    print(problem(given.items, given.places, given.goals, given.furniture, given.target), end="")
+    text = problem(given.items, given.places, given.goals, given.furniture, given.target)
+    if given.output is None:
+        print(text, end="")
+    else:
+        given.output.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -14,5 +14,5 @@
     (stored saw b1)
     (unknown (stored drill b1)))
   (:goal (delivered saw))
-  (:goal-probability 0.75)
+  (:goal-probability 0.95)
   (:metric minimize (total-cost)))

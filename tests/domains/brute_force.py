@@ -26,25 +26,35 @@ class Totals:
     cost: Fraction = Fraction(0)
     actions: Fraction = Fraction(0)
     reward: Fraction = Fraction(0)
+    open: Fraction = Fraction(0)
+    """Probability of the runs that were cut."""
 
 
-def brute_force(task: Task, root: Node) -> Totals:
-    """Step by step through every run of a tree whose actions are all latched."""
+_Run = tuple[Values, frozenset[str], tuple[tuple[str, int], ...]]
+"""The values, the latches, and the tries of each retry node."""
+
+
+def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> Totals:
+    """Step by step through every run of a tree, until what still runs is improbable."""
     totals = Totals()
-    runs: dict[tuple[Values, frozenset[str]], Fraction] = {}
+    runs: dict[_Run, Fraction] = {}
     for state in task.initial:
-        key = (tuple(int(value) for value in state.values), frozenset[str]())
+        key: _Run = (tuple(int(value) for value in state.values), frozenset(), ())
         runs[key] = runs.get(key, Fraction(0)) + state.probability
     while runs:
-        following: dict[tuple[Values, frozenset[str]], Fraction] = {}
-        for (values, finished), probability in runs.items():
-            run = Ticking(task, values, set(finished))
+        totals.open = sum(runs.values(), Fraction(0))
+        if totals.open < cut:
+            break
+        totals.open = Fraction(0)
+        following: dict[_Run, Fraction] = {}
+        for (values, finished, tries), probability in runs.items():
+            run = Ticking(task, values, set(finished), dict(tries))
             status = run.tick(root)
             node = run.started
             if node is None:
                 totals.ends[status] += probability
                 continue
-            assert node.latched
+            latches = finished | {node.id} if node.latched else finished
             action = task.action_by_name[node.action]
             assert value_of(action.precondition, values) == "T", "started without its precondition"
             totals.actions += probability
@@ -52,7 +62,7 @@ def brute_force(task: Task, root: Node) -> Totals:
                 share = probability * chance
                 totals.cost += share * (action.cost + cost)
                 totals.reward += share * reward
-                key = (_changed(values, sets), finished | {node.id})
+                key = (_changed(values, sets), latches, tuple(sorted(run.tries.items())))
                 following[key] = following.get(key, Fraction(0)) + share
         runs = following
     return totals
@@ -66,7 +76,7 @@ History = tuple[object, ...]
 def runs_of(task: Task, root: Node, most: int) -> dict[History, Fraction]:
     """Every run of any tree with its probability, cut after so many actions."""
     found: dict[History, Fraction] = {}
-    waiting = []
+    waiting: list[tuple[History, Ticking, Fraction]] = []
     for state in task.initial:
         values = tuple(int(value) for value in state.values)
         waiting.append(((values,), Ticking(task, values), state.probability))

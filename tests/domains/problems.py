@@ -19,6 +19,7 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
 from bbtc.plan.result import Plan
+from bbtc.plan.strategies import DEFAULT
 from bbtc.syntax.reader import read_source
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -35,6 +36,16 @@ class Problem:
     def files(self) -> tuple[str, str]:
         """The paths of the domain and the problem, from the top of the repository."""
         return f"domains/{self.domain}/domain.pddl", f"domains/{self.domain}/{self.name}.pddl"
+
+    @property
+    def strategy(self) -> str:
+        """How its artefacts are planned: the paper's domain as in the paper, the others by default."""
+        return "refine" if self.domain == "household" else DEFAULT
+
+    @property
+    def switches(self) -> list[str]:
+        """What to tell ``bbtc plan`` for that."""
+        return [] if self.strategy == DEFAULT else ["--strategy", self.strategy]
 
     def __str__(self) -> str:
         return f"{self.domain}/{self.name}"
@@ -56,9 +67,9 @@ def task_of(problem: Problem) -> Task:
 
 
 @functools.cache
-def plan_of(problem: Problem) -> Plan:
-    """The plan for the problem's own target."""
-    return plan_task(task_of(problem), None, "refine", Limits(), lambda _: None)
+def plan_of(problem: Problem, strategy: str | None = None) -> Plan:
+    """The plan for the problem's own target, by the problem's own strategy unless another is given."""
+    return plan_task(task_of(problem), None, strategy or problem.strategy, Limits(), lambda _: None)
 
 
 # --- the command line ------------------------------------------------------------------------
@@ -110,7 +121,7 @@ def artefacts(problem: Problem) -> dict[str, bytes]:
         return done
 
     made["task.json"] = run("compile", *problem.files).out
-    planned = run("plan", *problem.files)
+    planned = run("plan", *problem.files, *problem.switches)
     made["tree.json"], made["plan.txt"] = planned.out, planned.err.encode()
     for name, form in EXPORTS.items():
         made[name] = run("export", "-", "--to", form, stdin=planned.out).out

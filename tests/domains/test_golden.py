@@ -36,7 +36,7 @@ def test_every_golden_file_is_one_of_a_problem() -> None:
 def test_artefacts_can_be_read_back(problem: Problem) -> None:
     """A plan made from the saved task is the plan made from the sources."""
     folder = GOLDEN / str(problem)
-    planned = bbtc("plan", "-", "-q", stdin=(folder / "task.json").read_bytes())
+    planned = bbtc("plan", "-", "-q", *problem.switches, stdin=(folder / "task.json").read_bytes())
     assert planned.status == 0, planned.err
     assert planned.out == (folder / "tree.json").read_bytes()
 

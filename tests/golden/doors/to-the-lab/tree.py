@@ -1,6 +1,6 @@
 """Behavior tree for the problem to-the-lab of the domain doors. Made by bbtc.
 
-In the model of that domain it succeeds with probability 44387/54675.
+In the model of that domain it succeeds with probability 547/675.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -146,6 +146,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -154,6 +198,11 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -222,160 +271,83 @@ def create_root(robot: Robot) -> Behaviour:
             "fallback",
             Condition("in(lab)", lambda: robot.is_in("lab")),
             sequence(
-                "sequence for in(lab)",
-                fallback(
-                    "fallback",
-                    Condition("in(corridor)", lambda: robot.is_in("corridor")),
-                    sequence(
-                        "sequence for in(corridor)",
-                        Condition("in(hall)", lambda: robot.is_in("hall")),
-                        fallback(
-                            "fallback",
-                            Condition("open(corridor_door)", lambda: robot.open("corridor_door")),
-                            sequence(
-                                "sequence for open(corridor_door)",
-                                Condition(
-                                    "unknown locked(corridor_door)",
-                                    lambda: robot.locked("corridor_door") is None,
-                                ),
-                                Condition("in(hall)", lambda: robot.is_in("hall")),
-                                Latch(
-                                    "try_handle(corridor_door,hall)",
-                                    lambda: robot.try_handle("corridor_door", "hall"),
-                                    robot.cancel,
-                                ),
-                                Condition(
-                                    "open(corridor_door)",
-                                    lambda: robot.open("corridor_door"),
-                                ),
-                            ),
-                            sequence(
-                                "sequence for open(corridor_door)",
-                                Condition(
-                                    "locked(corridor_door)",
-                                    lambda: robot.locked("corridor_door"),
-                                ),
-                                Latch(
-                                    "call_control_room(corridor_door)",
-                                    lambda: robot.call_control_room("corridor_door"),
-                                    robot.cancel,
-                                ),
-                                Condition(
-                                    "open(corridor_door)",
-                                    lambda: robot.open("corridor_door"),
-                                ),
-                            ),
-                            sequence(
-                                "sequence for open(corridor_door)",
-                                Condition(
-                                    "locked(corridor_door)",
-                                    lambda: robot.locked("corridor_door"),
-                                ),
-                                Latch(
-                                    "call_control_room(corridor_door)",
-                                    lambda: robot.call_control_room("corridor_door"),
-                                    robot.cancel,
-                                ),
-                                Condition(
-                                    "open(corridor_door)",
-                                    lambda: robot.open("corridor_door"),
-                                ),
-                            ),
-                            sequence(
-                                "sequence for open(corridor_door)",
-                                Condition(
-                                    "locked(corridor_door)",
-                                    lambda: robot.locked("corridor_door"),
-                                ),
-                                Latch(
-                                    "call_control_room(corridor_door)",
-                                    lambda: robot.call_control_room("corridor_door"),
-                                    robot.cancel,
-                                ),
-                                Condition(
-                                    "open(corridor_door)",
-                                    lambda: robot.open("corridor_door"),
-                                ),
-                            ),
-                            sequence(
-                                "sequence for open(corridor_door)",
-                                Condition(
-                                    "locked(corridor_door)",
-                                    lambda: robot.locked("corridor_door"),
-                                ),
-                                Latch(
-                                    "call_control_room(corridor_door)",
-                                    lambda: robot.call_control_room("corridor_door"),
-                                    robot.cancel,
-                                ),
-                                Condition(
-                                    "open(corridor_door)",
-                                    lambda: robot.open("corridor_door"),
-                                ),
-                            ),
-                        ),
-                        Latch(
-                            "go_through(corridor_door,hall,corridor)",
-                            lambda: robot.go_through("corridor_door", "hall", "corridor"),
-                            robot.cancel,
-                        ),
-                        Condition("in(corridor)", lambda: robot.is_in("corridor")),
-                    ),
-                ),
-                fallback(
-                    "fallback",
-                    Condition("open(lab_door)", lambda: robot.open("lab_door")),
-                    sequence(
-                        "sequence for open(lab_door)",
-                        Condition(
-                            "unknown locked(lab_door)",
-                            lambda: robot.locked("lab_door") is None,
-                        ),
-                        Condition("in(corridor)", lambda: robot.is_in("corridor")),
-                        Latch(
-                            "try_handle(lab_door,corridor)",
-                            lambda: robot.try_handle("lab_door", "corridor"),
-                            robot.cancel,
-                        ),
+                "sequence",
+                retry(
+                    "retry",
+                    7,
+                    fallback(
+                        "fallback",
                         Condition("open(lab_door)", lambda: robot.open("lab_door")),
-                    ),
-                    sequence(
-                        "sequence for open(lab_door)",
-                        Condition("locked(lab_door)", lambda: robot.locked("lab_door")),
-                        Latch(
+                        sequence(
+                            "sequence",
+                            Condition(
+                                "unknown locked(lab_door)",
+                                lambda: robot.locked("lab_door") is None,
+                            ),
+                            fallback(
+                                "fallback",
+                                Condition("in(corridor)", lambda: robot.is_in("corridor")),
+                                sequence(
+                                    "sequence",
+                                    fallback(
+                                        "fallback",
+                                        Condition(
+                                            "open(corridor_door)",
+                                            lambda: robot.open("corridor_door"),
+                                        ),
+                                        sequence(
+                                            "sequence",
+                                            Condition(
+                                                "unknown locked(corridor_door)",
+                                                lambda: robot.locked("corridor_door") is None,
+                                            ),
+                                            Try(
+                                                "try_handle(corridor_door,hall)",
+                                                lambda: robot.try_handle("corridor_door", "hall"),
+                                                robot.cancel,
+                                                keep=False,
+                                            ),
+                                        ),
+                                        Try(
+                                            "call_control_room(corridor_door)",
+                                            lambda: robot.call_control_room("corridor_door"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                    Try(
+                                        "go_through(corridor_door,hall,corridor)",
+                                        lambda: robot.go_through(
+                                            "corridor_door",
+                                            "hall",
+                                            "corridor",
+                                        ),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                            ),
+                            Try(
+                                "try_handle(lab_door,corridor)",
+                                lambda: robot.try_handle("lab_door", "corridor"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                        Try(
                             "call_control_room(lab_door)",
                             lambda: robot.call_control_room("lab_door"),
                             robot.cancel,
+                            keep=False,
                         ),
-                        Condition("open(lab_door)", lambda: robot.open("lab_door")),
-                    ),
-                    sequence(
-                        "sequence for open(lab_door)",
-                        Condition("locked(lab_door)", lambda: robot.locked("lab_door")),
-                        Latch(
-                            "call_control_room(lab_door)",
-                            lambda: robot.call_control_room("lab_door"),
-                            robot.cancel,
-                        ),
-                        Condition("open(lab_door)", lambda: robot.open("lab_door")),
-                    ),
-                    sequence(
-                        "sequence for open(lab_door)",
-                        Condition("locked(lab_door)", lambda: robot.locked("lab_door")),
-                        Latch(
-                            "call_control_room(lab_door)",
-                            lambda: robot.call_control_room("lab_door"),
-                            robot.cancel,
-                        ),
-                        Condition("open(lab_door)", lambda: robot.open("lab_door")),
                     ),
                 ),
                 Latch(
                     "go_through(lab_door,corridor,lab)",
                     lambda: robot.go_through("lab_door", "corridor", "lab"),
                     robot.cancel,
+                    keep=False,
                 ),
-                Condition("in(lab)", lambda: robot.is_in("lab")),
             ),
         ),
     )

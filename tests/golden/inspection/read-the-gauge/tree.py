@@ -58,8 +58,8 @@ class Robot(Protocol):
     def read_gauge(self, gauge: str, area: str) -> Status:
         """Start or continue read_gauge(gauge, area)."""
 
-    def switch_torch_on(self) -> Status:
-        """Start or continue switch_torch_on()."""
+    def switch_lamps_on(self, area: str) -> Status:
+        """Start or continue switch_lamps_on(area)."""
 
     def wipe_lens(self) -> Status:
         """Start or continue wipe_lens()."""
@@ -243,18 +243,15 @@ def create_root(robot: Robot) -> Behaviour:
                     lambda: robot.in_range("pressure") is not None,
                 ),
                 sequence(
-                    "sequence for known in_range(pressure)",
+                    "sequence",
                     fallback(
                         "fallback",
                         Condition("at(boiler_room)", lambda: robot.at("boiler_room")),
-                        sequence(
-                            "sequence for at(boiler_room)",
-                            Latch(
-                                "drive(boiler_room)",
-                                lambda: robot.drive("boiler_room"),
-                                robot.cancel,
-                            ),
-                            Condition("at(boiler_room)", lambda: robot.at("boiler_room")),
+                        Latch(
+                            "drive(boiler_room)",
+                            lambda: robot.drive("boiler_room"),
+                            robot.cancel,
+                            keep=False,
                         ),
                     ),
                     fallback(
@@ -263,42 +260,34 @@ def create_root(robot: Robot) -> Behaviour:
                             "(lit(boiler_room) or torch_on())",
                             lambda: any_of(robot.lit("boiler_room"), robot.torch_on()),
                         ),
-                        sequence(
-                            "sequence for (lit(boiler_room) or torch_on())",
-                            Latch("switch_torch_on()", robot.switch_torch_on, robot.cancel),
-                            Condition(
-                                "(lit(boiler_room) or torch_on())",
-                                lambda: any_of(robot.lit("boiler_room"), robot.torch_on()),
-                            ),
+                        Latch(
+                            "switch_lamps_on(boiler_room)",
+                            lambda: robot.switch_lamps_on("boiler_room"),
+                            robot.cancel,
+                            keep=False,
                         ),
                     ),
                     fallback(
                         "fallback",
                         Condition("lens_clean()", robot.lens_clean),
-                        sequence(
-                            "sequence for lens_clean()",
-                            Latch("wipe_lens()", robot.wipe_lens, robot.cancel),
-                            Condition("lens_clean()", robot.lens_clean),
-                        ),
+                        Latch("wipe_lens()", robot.wipe_lens, robot.cancel, keep=False),
                     ),
                     Latch(
                         "read_gauge(pressure,boiler_room)",
                         lambda: robot.read_gauge("pressure", "boiler_room"),
                         robot.cancel,
-                    ),
-                    Condition(
-                        "known in_range(pressure)",
-                        lambda: robot.in_range("pressure") is not None,
+                        keep=False,
                     ),
                 ),
             ),
             fallback(
                 "fallback",
                 Condition("at(pump_hall)", lambda: robot.at("pump_hall")),
-                sequence(
-                    "sequence for at(pump_hall)",
-                    Latch("drive(pump_hall)", lambda: robot.drive("pump_hall"), robot.cancel),
-                    Condition("at(pump_hall)", lambda: robot.at("pump_hall")),
+                Latch(
+                    "drive(pump_hall)",
+                    lambda: robot.drive("pump_hall"),
+                    robot.cancel,
+                    keep=False,
                 ),
             ),
         ),
@@ -442,7 +431,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("1/20", {("in_range", "pressure"): False}),
         ],
     ],
-    ("switch_torch_on",): [[Outcome("1", {("torch_on",): True})]],
+    ("switch_lamps_on", "boiler_room"): [
+        [Outcome("4/5", {("lit", "boiler_room"): True}), Outcome("1/5", {})],
+    ],
     ("wipe_lens",): [[Outcome("1", {("lens_clean",): True})]],
 }
 """What each action does: independent choices between outcomes."""
@@ -472,8 +463,8 @@ class SimulatedWorld(World):
     def read_gauge(self, gauge: str, area: str) -> Status:
         return self._act("read_gauge", gauge, area)
 
-    def switch_torch_on(self) -> Status:
-        return self._act("switch_torch_on")
+    def switch_lamps_on(self, area: str) -> Status:
+        return self._act("switch_lamps_on", area)
 
     def wipe_lens(self) -> Status:
         return self._act("wipe_lens")

@@ -1,6 +1,6 @@
 """Behavior tree for the problem gift-set of the domain kitting. Made by bbtc.
 
-In the model of that domain it succeeds with probability 635449916832017/737280000000000.
+In the model of that domain it succeeds with probability 53246760311/61440000000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -37,9 +37,6 @@ class Robot(Protocol):
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
-    def gripper_free(self) -> bool:
-        """Whether gripper_free() holds."""
-
     def holding(self, item: str) -> bool | None:
         """Whether holding(item) holds; None where that is unknown."""
 
@@ -63,13 +60,6 @@ class Robot(Protocol):
 
     def read_force_sensor(self, item: str) -> Status:
         """Start or continue read_force_sensor(item)."""
-
-
-def all_of(*values: bool | None) -> bool | None:
-    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
-    if False in values:
-        return False
-    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -167,6 +157,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -200,6 +234,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -264,361 +303,122 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        sequence(
-            "sequence",
-            fallback(
-                "fallback",
-                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
-                sequence(
-                    "sequence for packed(wine,crate1)",
-                    fallback(
-                        "fallback",
-                        skipper(
-                            "skipper",
-                            Condition("holding(wine)", lambda: robot.holding("wine")),
-                            fallback(
-                                "fallback",
-                                sequence(
-                                    "sequence for holding(wine)",
-                                    Latch(
-                                        "read_force_sensor(wine)",
-                                        lambda: robot.read_force_sensor("wine"),
-                                        robot.cancel,
-                                    ),
-                                    Condition(
-                                        "known holding(wine)",
-                                        lambda: robot.holding("wine") is not None,
-                                    ),
-                                ),
-                                sequence(
-                                    "sequence for holding(wine)",
-                                    Latch(
-                                        "read_force_sensor(wine)",
-                                        lambda: robot.read_force_sensor("wine"),
-                                        robot.cancel,
-                                    ),
-                                    Condition(
-                                        "known holding(wine)",
-                                        lambda: robot.holding("wine") is not None,
-                                    ),
-                                ),
-                            ),
-                        ),
-                        sequence(
-                            "sequence for holding(wine)",
-                            sequence(
-                                "secure(wine)",
-                                fallback(
-                                    "fallback",
-                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
-                                    Latch(
-                                        "look_for(wine)",
-                                        lambda: robot.look_for("wine"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.in_view("wine")),
-                                            negated(robot.lost("wine")),
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "pick(wine)",
-                                    lambda: robot.pick("wine"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.gripper_free(),
-                                        robot.in_view("wine"),
-                                        negated(robot.holding("wine")),
-                                        negated(robot.lost("wine")),
-                                    ),
-                                ),
-                                Latch(
-                                    "read_force_sensor(wine)",
-                                    lambda: robot.read_force_sensor("wine"),
-                                    robot.cancel,
-                                    guard=lambda: robot.holding("wine") is None,
-                                ),
-                                Condition("holding(wine)", lambda: robot.holding("wine")),
-                            ),
-                            Condition("holding(wine)", lambda: robot.holding("wine")),
-                        ),
-                        sequence(
-                            "sequence for holding(wine)",
-                            sequence(
-                                "secure(wine)",
-                                fallback(
-                                    "fallback",
-                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
-                                    Latch(
-                                        "look_for(wine)",
-                                        lambda: robot.look_for("wine"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.in_view("wine")),
-                                            negated(robot.lost("wine")),
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "pick(wine)",
-                                    lambda: robot.pick("wine"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.gripper_free(),
-                                        robot.in_view("wine"),
-                                        negated(robot.holding("wine")),
-                                        negated(robot.lost("wine")),
-                                    ),
-                                ),
-                                Latch(
-                                    "read_force_sensor(wine)",
-                                    lambda: robot.read_force_sensor("wine"),
-                                    robot.cancel,
-                                    guard=lambda: robot.holding("wine") is None,
-                                ),
-                                Condition("holding(wine)", lambda: robot.holding("wine")),
-                            ),
-                            Condition("holding(wine)", lambda: robot.holding("wine")),
-                        ),
-                        sequence(
-                            "sequence for holding(wine)",
-                            sequence(
-                                "secure(wine)",
-                                fallback(
-                                    "fallback",
-                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
-                                    Latch(
-                                        "look_for(wine)",
-                                        lambda: robot.look_for("wine"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.in_view("wine")),
-                                            negated(robot.lost("wine")),
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "pick(wine)",
-                                    lambda: robot.pick("wine"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.gripper_free(),
-                                        robot.in_view("wine"),
-                                        negated(robot.holding("wine")),
-                                        negated(robot.lost("wine")),
-                                    ),
-                                ),
-                                Latch(
-                                    "read_force_sensor(wine)",
-                                    lambda: robot.read_force_sensor("wine"),
-                                    robot.cancel,
-                                    guard=lambda: robot.holding("wine") is None,
-                                ),
-                                Condition("holding(wine)", lambda: robot.holding("wine")),
-                            ),
-                            Condition("holding(wine)", lambda: robot.holding("wine")),
-                        ),
-                    ),
-                    Latch(
-                        "place(wine,crate1)",
-                        lambda: robot.place("wine", "crate1"),
-                        robot.cancel,
-                    ),
+        retry(
+            "retry",
+            12,
+            sequence(
+                "sequence",
+                fallback(
+                    "fallback",
                     Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
-                ),
-                sequence(
-                    "sequence for packed(wine,crate1)",
-                    Condition("holding(wine)", lambda: robot.holding("wine")),
-                    Latch(
-                        "place(wine,crate1)",
-                        lambda: robot.place("wine", "crate1"),
-                        robot.cancel,
-                    ),
-                    Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
-                ),
-            ),
-            fallback(
-                "fallback",
-                Condition(
-                    "packed(chocolates,crate1)",
-                    lambda: robot.packed("chocolates", "crate1"),
-                ),
-                sequence(
-                    "sequence for packed(chocolates,crate1)",
-                    fallback(
-                        "fallback",
-                        skipper(
-                            "skipper",
-                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
-                            fallback(
-                                "fallback",
-                                sequence(
-                                    "sequence for holding(chocolates)",
-                                    Latch(
-                                        "read_force_sensor(chocolates)",
-                                        lambda: robot.read_force_sensor("chocolates"),
-                                        robot.cancel,
-                                    ),
-                                    Condition(
-                                        "known holding(chocolates)",
-                                        lambda: robot.holding("chocolates") is not None,
-                                    ),
-                                ),
-                                sequence(
-                                    "sequence for holding(chocolates)",
-                                    Latch(
-                                        "read_force_sensor(chocolates)",
-                                        lambda: robot.read_force_sensor("chocolates"),
-                                        robot.cancel,
-                                    ),
-                                    Condition(
-                                        "known holding(chocolates)",
-                                        lambda: robot.holding("chocolates") is not None,
-                                    ),
+                    sequence(
+                        "sequence",
+                        fallback(
+                            "fallback",
+                            skipper(
+                                "skipper",
+                                Condition("holding(wine)", lambda: robot.holding("wine")),
+                                Try(
+                                    "read_force_sensor(wine)",
+                                    lambda: robot.read_force_sensor("wine"),
+                                    robot.cancel,
+                                    keep=False,
                                 ),
                             ),
-                        ),
-                        sequence(
-                            "sequence for holding(chocolates)",
                             sequence(
-                                "secure(chocolates)",
+                                "sequence",
                                 fallback(
                                     "fallback",
-                                    Condition(
-                                        "in_view(chocolates)",
-                                        lambda: robot.in_view("chocolates"),
-                                    ),
-                                    Latch(
-                                        "look_for(chocolates)",
-                                        lambda: robot.look_for("chocolates"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.in_view("chocolates")),
-                                            negated(robot.lost("chocolates")),
+                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
+                                    sequence(
+                                        "sequence",
+                                        Condition(
+                                            "not lost(wine)",
+                                            lambda: negated(robot.lost("wine")),
+                                        ),
+                                        Try(
+                                            "look_for(wine)",
+                                            lambda: robot.look_for("wine"),
+                                            robot.cancel,
+                                            keep=False,
                                         ),
                                     ),
                                 ),
-                                Latch(
-                                    "pick(chocolates)",
-                                    lambda: robot.pick("chocolates"),
+                                Try(
+                                    "pick(wine)",
+                                    lambda: robot.pick("wine"),
                                     robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.gripper_free(),
-                                        robot.in_view("chocolates"),
-                                        negated(robot.holding("chocolates")),
-                                        negated(robot.lost("chocolates")),
-                                    ),
-                                ),
-                                Latch(
-                                    "read_force_sensor(chocolates)",
-                                    lambda: robot.read_force_sensor("chocolates"),
-                                    robot.cancel,
-                                    guard=lambda: robot.holding("chocolates") is None,
-                                ),
-                                Condition(
-                                    "holding(chocolates)",
-                                    lambda: robot.holding("chocolates"),
+                                    keep=False,
                                 ),
                             ),
-                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
                         ),
-                        sequence(
-                            "sequence for holding(chocolates)",
-                            sequence(
-                                "secure(chocolates)",
-                                fallback(
-                                    "fallback",
-                                    Condition(
-                                        "in_view(chocolates)",
-                                        lambda: robot.in_view("chocolates"),
-                                    ),
-                                    Latch(
-                                        "look_for(chocolates)",
-                                        lambda: robot.look_for("chocolates"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.in_view("chocolates")),
-                                            negated(robot.lost("chocolates")),
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "pick(chocolates)",
-                                    lambda: robot.pick("chocolates"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.gripper_free(),
-                                        robot.in_view("chocolates"),
-                                        negated(robot.holding("chocolates")),
-                                        negated(robot.lost("chocolates")),
-                                    ),
-                                ),
-                                Latch(
-                                    "read_force_sensor(chocolates)",
-                                    lambda: robot.read_force_sensor("chocolates"),
-                                    robot.cancel,
-                                    guard=lambda: robot.holding("chocolates") is None,
-                                ),
-                                Condition(
-                                    "holding(chocolates)",
-                                    lambda: robot.holding("chocolates"),
-                                ),
-                            ),
-                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
-                        ),
-                        sequence(
-                            "sequence for holding(chocolates)",
-                            sequence(
-                                "secure(chocolates)",
-                                fallback(
-                                    "fallback",
-                                    Condition(
-                                        "in_view(chocolates)",
-                                        lambda: robot.in_view("chocolates"),
-                                    ),
-                                    Latch(
-                                        "look_for(chocolates)",
-                                        lambda: robot.look_for("chocolates"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.in_view("chocolates")),
-                                            negated(robot.lost("chocolates")),
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "pick(chocolates)",
-                                    lambda: robot.pick("chocolates"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.gripper_free(),
-                                        robot.in_view("chocolates"),
-                                        negated(robot.holding("chocolates")),
-                                        negated(robot.lost("chocolates")),
-                                    ),
-                                ),
-                                Latch(
-                                    "read_force_sensor(chocolates)",
-                                    lambda: robot.read_force_sensor("chocolates"),
-                                    robot.cancel,
-                                    guard=lambda: robot.holding("chocolates") is None,
-                                ),
-                                Condition(
-                                    "holding(chocolates)",
-                                    lambda: robot.holding("chocolates"),
-                                ),
-                            ),
-                            Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
+                        Try(
+                            "place(wine,crate1)",
+                            lambda: robot.place("wine", "crate1"),
+                            robot.cancel,
+                            keep=False,
                         ),
                     ),
-                    Latch(
-                        "place(chocolates,crate1)",
-                        lambda: robot.place("chocolates", "crate1"),
-                        robot.cancel,
-                    ),
+                ),
+                fallback(
+                    "fallback",
                     Condition(
                         "packed(chocolates,crate1)",
                         lambda: robot.packed("chocolates", "crate1"),
+                    ),
+                    sequence(
+                        "sequence",
+                        fallback(
+                            "fallback",
+                            skipper(
+                                "skipper",
+                                Condition(
+                                    "holding(chocolates)",
+                                    lambda: robot.holding("chocolates"),
+                                ),
+                                Try(
+                                    "read_force_sensor(chocolates)",
+                                    lambda: robot.read_force_sensor("chocolates"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                            sequence(
+                                "sequence",
+                                fallback(
+                                    "fallback",
+                                    Condition(
+                                        "in_view(chocolates)",
+                                        lambda: robot.in_view("chocolates"),
+                                    ),
+                                    sequence(
+                                        "sequence",
+                                        Condition(
+                                            "not lost(chocolates)",
+                                            lambda: negated(robot.lost("chocolates")),
+                                        ),
+                                        Try(
+                                            "look_for(chocolates)",
+                                            lambda: robot.look_for("chocolates"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                ),
+                                Try(
+                                    "pick(chocolates)",
+                                    lambda: robot.pick("chocolates"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                        ),
+                        Try(
+                            "place(chocolates,crate1)",
+                            lambda: robot.place("chocolates", "crate1"),
+                            robot.cancel,
+                            keep=False,
+                        ),
                     ),
                 ),
             ),
@@ -864,9 +664,6 @@ ACTIONS: dict[Fact, list[Factor]] = {
 
 class SimulatedWorld(World):
     """Plays the robot."""
-
-    def gripper_free(self) -> bool:
-        return self._value("gripper_free") is True
 
     def holding(self, item: str) -> bool | None:
         return self._value("holding", item)

@@ -1,6 +1,6 @@
 """Behavior tree for the problem one-bottle of the domain kitting. Made by bbtc.
 
-In the model of that domain it succeeds with probability 18613863/20480000.
+In the model of that domain it succeeds with probability 115834773/128000000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -37,9 +37,6 @@ class Robot(Protocol):
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
-    def gripper_free(self) -> bool:
-        """Whether gripper_free() holds."""
-
     def holding(self, item: str) -> bool | None:
         """Whether holding(item) holds; None where that is unknown."""
 
@@ -63,13 +60,6 @@ class Robot(Protocol):
 
     def read_force_sensor(self, item: str) -> Status:
         """Start or continue read_force_sensor(item)."""
-
-
-def all_of(*values: bool | None) -> bool | None:
-    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
-    if False in values:
-        return False
-    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -167,6 +157,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -200,6 +234,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -267,158 +306,57 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("packed(water,tray1)", lambda: robot.packed("water", "tray1")),
-            sequence(
-                "sequence for packed(water,tray1)",
-                fallback(
-                    "fallback",
-                    skipper(
-                        "skipper",
-                        Condition("holding(water)", lambda: robot.holding("water")),
-                        fallback(
-                            "fallback",
-                            sequence(
-                                "sequence for holding(water)",
-                                Latch(
-                                    "read_force_sensor(water)",
-                                    lambda: robot.read_force_sensor("water"),
-                                    robot.cancel,
-                                ),
-                                Condition(
-                                    "known holding(water)",
-                                    lambda: robot.holding("water") is not None,
-                                ),
-                            ),
-                            sequence(
-                                "sequence for holding(water)",
-                                Latch(
-                                    "read_force_sensor(water)",
-                                    lambda: robot.read_force_sensor("water"),
-                                    robot.cancel,
-                                ),
-                                Condition(
-                                    "known holding(water)",
-                                    lambda: robot.holding("water") is not None,
-                                ),
-                            ),
-                        ),
-                    ),
-                    sequence(
-                        "sequence for holding(water)",
-                        sequence(
-                            "secure(water)",
-                            fallback(
-                                "fallback",
-                                Condition("in_view(water)", lambda: robot.in_view("water")),
-                                Latch(
-                                    "look_for(water)",
-                                    lambda: robot.look_for("water"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        negated(robot.in_view("water")),
-                                        negated(robot.lost("water")),
-                                    ),
-                                ),
-                            ),
-                            Latch(
-                                "pick(water)",
-                                lambda: robot.pick("water"),
-                                robot.cancel,
-                                guard=lambda: all_of(
-                                    robot.gripper_free(),
-                                    robot.in_view("water"),
-                                    negated(robot.holding("water")),
-                                    negated(robot.lost("water")),
-                                ),
-                            ),
-                            Latch(
+            retry(
+                "retry",
+                8,
+                sequence(
+                    "sequence",
+                    fallback(
+                        "fallback",
+                        skipper(
+                            "skipper",
+                            Condition("holding(water)", lambda: robot.holding("water")),
+                            Try(
                                 "read_force_sensor(water)",
                                 lambda: robot.read_force_sensor("water"),
                                 robot.cancel,
-                                guard=lambda: robot.holding("water") is None,
+                                keep=False,
                             ),
-                            Condition("holding(water)", lambda: robot.holding("water")),
                         ),
-                        Condition("holding(water)", lambda: robot.holding("water")),
-                    ),
-                    sequence(
-                        "sequence for holding(water)",
                         sequence(
-                            "secure(water)",
+                            "sequence",
                             fallback(
                                 "fallback",
                                 Condition("in_view(water)", lambda: robot.in_view("water")),
-                                Latch(
-                                    "look_for(water)",
-                                    lambda: robot.look_for("water"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        negated(robot.in_view("water")),
-                                        negated(robot.lost("water")),
+                                sequence(
+                                    "sequence",
+                                    Condition(
+                                        "not lost(water)",
+                                        lambda: negated(robot.lost("water")),
+                                    ),
+                                    Try(
+                                        "look_for(water)",
+                                        lambda: robot.look_for("water"),
+                                        robot.cancel,
+                                        keep=False,
                                     ),
                                 ),
                             ),
-                            Latch(
+                            Try(
                                 "pick(water)",
                                 lambda: robot.pick("water"),
                                 robot.cancel,
-                                guard=lambda: all_of(
-                                    robot.gripper_free(),
-                                    robot.in_view("water"),
-                                    negated(robot.holding("water")),
-                                    negated(robot.lost("water")),
-                                ),
+                                keep=False,
                             ),
-                            Latch(
-                                "read_force_sensor(water)",
-                                lambda: robot.read_force_sensor("water"),
-                                robot.cancel,
-                                guard=lambda: robot.holding("water") is None,
-                            ),
-                            Condition("holding(water)", lambda: robot.holding("water")),
                         ),
-                        Condition("holding(water)", lambda: robot.holding("water")),
                     ),
-                    sequence(
-                        "sequence for holding(water)",
-                        sequence(
-                            "secure(water)",
-                            fallback(
-                                "fallback",
-                                Condition("in_view(water)", lambda: robot.in_view("water")),
-                                Latch(
-                                    "look_for(water)",
-                                    lambda: robot.look_for("water"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        negated(robot.in_view("water")),
-                                        negated(robot.lost("water")),
-                                    ),
-                                ),
-                            ),
-                            Latch(
-                                "pick(water)",
-                                lambda: robot.pick("water"),
-                                robot.cancel,
-                                guard=lambda: all_of(
-                                    robot.gripper_free(),
-                                    robot.in_view("water"),
-                                    negated(robot.holding("water")),
-                                    negated(robot.lost("water")),
-                                ),
-                            ),
-                            Latch(
-                                "read_force_sensor(water)",
-                                lambda: robot.read_force_sensor("water"),
-                                robot.cancel,
-                                guard=lambda: robot.holding("water") is None,
-                            ),
-                            Condition("holding(water)", lambda: robot.holding("water")),
-                        ),
-                        Condition("holding(water)", lambda: robot.holding("water")),
+                    Try(
+                        "place(water,tray1)",
+                        lambda: robot.place("water", "tray1"),
+                        robot.cancel,
+                        keep=False,
                     ),
                 ),
-                Latch("place(water,tray1)", lambda: robot.place("water", "tray1"), robot.cancel),
-                Condition("packed(water,tray1)", lambda: robot.packed("water", "tray1")),
             ),
         ),
     )
@@ -600,9 +538,6 @@ ACTIONS: dict[Fact, list[Factor]] = {
 
 class SimulatedWorld(World):
     """Plays the robot."""
-
-    def gripper_free(self) -> bool:
-        return self._value("gripper_free") is True
 
     def holding(self, item: str) -> bool | None:
         return self._value("holding", item)

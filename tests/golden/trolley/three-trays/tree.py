@@ -1,6 +1,6 @@
 """Behavior tree for the problem three-trays of the domain trolley. Made by bbtc.
 
-In the model of that domain it succeeds with probability 13824/15625.
+In the model of that domain it succeeds with probability 12393/12500.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -37,11 +37,8 @@ class Robot(Protocol):
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
-    def on(self, tray: str) -> bool:
-        """Whether on(tray) holds."""
-
-    def spilled(self, tray: str) -> bool:
-        """Whether spilled(tray) holds."""
+    def strapped(self, tray: str) -> bool:
+        """Whether strapped(tray) holds."""
 
     def trolley_at(self, place: str) -> bool:
         """Whether trolley_at(place) holds."""
@@ -49,8 +46,8 @@ class Robot(Protocol):
     def push(self, to: str) -> Status:
         """Start or continue push(to)."""
 
-    def put_back(self, tray: str) -> Status:
-        """Start or continue put_back(tray)."""
+    def strap(self, tray: str) -> Status:
+        """Start or continue strap(tray)."""
 
 
 def all_of(*values: bool | None) -> bool | None:
@@ -155,6 +152,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -163,6 +204,11 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -227,46 +273,28 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        sequence(
-            "sequence",
+        retry(
+            "retry",
+            6,
             fallback(
                 "fallback",
                 Condition("trolley_at(ward)", lambda: robot.trolley_at("ward")),
                 sequence(
-                    "sequence for trolley_at(ward)",
-                    Latch("push(ward)", lambda: robot.push("ward"), robot.cancel),
-                    Condition("trolley_at(ward)", lambda: robot.trolley_at("ward")),
+                    "sequence",
+                    Condition("not strapped(tray1)", lambda: negated(robot.strapped("tray1"))),
+                    Try("strap(tray1)", lambda: robot.strap("tray1"), robot.cancel, keep=False),
                 ),
-            ),
-            fallback(
-                "fallback",
-                Condition("on(tray1)", lambda: robot.on("tray1")),
                 sequence(
-                    "sequence for on(tray1)",
-                    Condition("not spilled(tray1)", lambda: negated(robot.spilled("tray1"))),
-                    Latch("put_back(tray1)", lambda: robot.put_back("tray1"), robot.cancel),
-                    Condition("on(tray1)", lambda: robot.on("tray1")),
+                    "sequence",
+                    Condition("not strapped(tray2)", lambda: negated(robot.strapped("tray2"))),
+                    Try("strap(tray2)", lambda: robot.strap("tray2"), robot.cancel, keep=False),
                 ),
-            ),
-            fallback(
-                "fallback",
-                Condition("on(tray2)", lambda: robot.on("tray2")),
                 sequence(
-                    "sequence for on(tray2)",
-                    Condition("not spilled(tray2)", lambda: negated(robot.spilled("tray2"))),
-                    Latch("put_back(tray2)", lambda: robot.put_back("tray2"), robot.cancel),
-                    Condition("on(tray2)", lambda: robot.on("tray2")),
+                    "sequence",
+                    Condition("strapped(tray3)", lambda: robot.strapped("tray3")),
+                    Try("push(ward)", lambda: robot.push("ward"), robot.cancel, keep=False),
                 ),
-            ),
-            fallback(
-                "fallback",
-                Condition("on(tray3)", lambda: robot.on("tray3")),
-                sequence(
-                    "sequence for on(tray3)",
-                    Condition("not spilled(tray3)", lambda: negated(robot.spilled("tray3"))),
-                    Latch("put_back(tray3)", lambda: robot.put_back("tray3"), robot.cancel),
-                    Condition("on(tray3)", lambda: robot.on("tray3")),
-                ),
+                Try("strap(tray3)", lambda: robot.strap("tray3"), robot.cancel, keep=False),
             ),
         ),
     )
@@ -462,9 +490,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("9/10", {}),
         ],
     ],
-    ("put_back", "tray1"): [[Outcome("4/5", {("on", "tray1"): True}), Outcome("1/5", {})]],
-    ("put_back", "tray2"): [[Outcome("4/5", {("on", "tray2"): True}), Outcome("1/5", {})]],
-    ("put_back", "tray3"): [[Outcome("4/5", {("on", "tray3"): True}), Outcome("1/5", {})]],
+    ("strap", "tray1"): [[Outcome("9/10", {("strapped", "tray1"): True}), Outcome("1/10", {})]],
+    ("strap", "tray2"): [[Outcome("9/10", {("strapped", "tray2"): True}), Outcome("1/10", {})]],
+    ("strap", "tray3"): [[Outcome("9/10", {("strapped", "tray3"): True}), Outcome("1/10", {})]],
 }
 """What each action does: independent choices between outcomes."""
 
@@ -472,11 +500,8 @@ ACTIONS: dict[Fact, list[Factor]] = {
 class SimulatedWorld(World):
     """Plays the robot."""
 
-    def on(self, tray: str) -> bool:
-        return self._value("on", tray) is True
-
-    def spilled(self, tray: str) -> bool:
-        return self._value("spilled", tray) is True
+    def strapped(self, tray: str) -> bool:
+        return self._value("strapped", tray) is True
 
     def trolley_at(self, place: str) -> bool:
         return self._value("trolley_at", place) is True
@@ -484,8 +509,8 @@ class SimulatedWorld(World):
     def push(self, to: str) -> Status:
         return self._act("push", to)
 
-    def put_back(self, tray: str) -> Status:
-        return self._act("put_back", tray)
+    def strap(self, tray: str) -> Status:
+        return self._act("strap", tray)
 
 
 def main() -> None:

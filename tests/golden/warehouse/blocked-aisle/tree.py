@@ -1,6 +1,6 @@
 """Behavior tree for the problem blocked-aisle of the domain warehouse. Made by bbtc.
 
-In the model of that domain it succeeds with probability 243/320.
+In the model of that domain it succeeds with probability 384183/400000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -49,9 +49,6 @@ class Robot(Protocol):
     def loaded(self, item: str) -> bool:
         """Whether loaded(item) holds."""
 
-    def stored(self, item: str, shelf: str) -> bool:
-        """Whether stored(item, shelf) holds."""
-
     def drive(self, to: str) -> Status:
         """Start or continue drive(to)."""
 
@@ -63,20 +60,6 @@ class Robot(Protocol):
 
     def move_pallet(self, arg_from: str, to: str) -> Status:
         """Start or continue move_pallet(arg_from, to)."""
-
-
-def all_of(*values: bool | None) -> bool | None:
-    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
-    if False in values:
-        return False
-    return None if None in values else True
-
-
-def any_of(*values: bool | None) -> bool | None:
-    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
-    if True in values:
-        return True
-    return None if None in values else False
 
 
 def negated(value: bool | None) -> bool | None:
@@ -174,6 +157,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -182,6 +209,11 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -246,145 +278,51 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        fallback(
-            "fallback",
-            Condition("delivered(saw)", lambda: robot.delivered("saw")),
-            sequence(
-                "sequence for delivered(saw)",
-                fallback(
-                    "fallback",
-                    Condition("loaded(saw)", lambda: robot.loaded("saw")),
-                    sequence(
-                        "sequence for loaded(saw)",
-                        fallback(
-                            "fallback",
-                            Condition("at(b1)", lambda: robot.at("b1")),
-                            sequence(
-                                "sequence for at(b1)",
-                                fallback(
-                                    "fallback",
-                                    Condition(
-                                        "(at(b1) or (at(packing) and not blocked(packing,b1)))",
-                                        lambda: any_of(
-                                            robot.at("b1"),
-                                            all_of(
-                                                robot.at("packing"),
-                                                negated(robot.blocked("packing", "b1")),
-                                            ),
-                                        ),
-                                    ),
-                                    sequence(
-                                        "sequence for (at(b1) or (at(packing) and not blocked(packing,b1)))",
-                                        Condition(
-                                            "blocked(packing,b1)",
-                                            lambda: robot.blocked("packing", "b1"),
-                                        ),
-                                        Condition(
-                                            "(at(packing) or ((at(b1) or (at(packing) and not blocked(pa…",
-                                            lambda: any_of(
-                                                robot.at("packing"),
-                                                all_of(
-                                                    any_of(
-                                                        robot.at("b1"),
-                                                        all_of(
-                                                            robot.at("packing"),
-                                                            negated(robot.blocked("packing", "b1")),
-                                                        ),
-                                                    ),
-                                                    negated(robot.blocked("packing", "b1")),
-                                                ),
-                                            ),
-                                        ),
-                                        Latch(
-                                            "move_pallet(packing,b1)",
-                                            lambda: robot.move_pallet("packing", "b1"),
-                                            robot.cancel,
-                                        ),
-                                        Condition(
-                                            "(at(b1) or (at(packing) and not blocked(packing,b1)))",
-                                            lambda: any_of(
-                                                robot.at("b1"),
-                                                all_of(
-                                                    robot.at("packing"),
-                                                    negated(robot.blocked("packing", "b1")),
-                                                ),
-                                            ),
-                                        ),
-                                    ),
-                                ),
-                                Latch("drive(b1)", lambda: robot.drive("b1"), robot.cancel),
-                                Condition("at(b1)", lambda: robot.at("b1")),
-                            ),
-                        ),
-                        Condition("stored(saw,b1)", lambda: robot.stored("saw", "b1")),
-                        Latch("fetch(saw,b1)", lambda: robot.fetch("saw", "b1"), robot.cancel),
-                        Condition("loaded(saw)", lambda: robot.loaded("saw")),
+        retry(
+            "retry",
+            9,
+            fallback(
+                "fallback",
+                Condition("delivered(saw)", lambda: robot.delivered("saw")),
+                sequence(
+                    "sequence",
+                    Condition("blocked(packing,b1)", lambda: robot.blocked("packing", "b1")),
+                    Try(
+                        "move_pallet(packing,b1)",
+                        lambda: robot.move_pallet("packing", "b1"),
+                        robot.cancel,
+                        keep=False,
                     ),
                 ),
-                fallback(
-                    "fallback",
-                    Condition("at(packing)", lambda: robot.at("packing")),
-                    sequence(
-                        "sequence for at(packing)",
-                        Condition(
-                            "(at(packing) or ((at(b1) or (at(packing) and not blocked(pa…",
-                            lambda: any_of(
-                                robot.at("packing"),
-                                all_of(
-                                    any_of(
-                                        robot.at("b1"),
-                                        all_of(
-                                            robot.at("packing"),
-                                            negated(robot.blocked("packing", "b1")),
-                                        ),
-                                    ),
-                                    negated(robot.blocked("packing", "b1")),
-                                ),
-                            ),
+                sequence(
+                    "sequence",
+                    Condition("not loaded(saw)", lambda: negated(robot.loaded("saw"))),
+                    fallback(
+                        "fallback",
+                        sequence(
+                            "sequence",
+                            Condition("not at(b1)", lambda: negated(robot.at("b1"))),
+                            Try("drive(b1)", lambda: robot.drive("b1"), robot.cancel, keep=False),
                         ),
-                        Latch("drive(packing)", lambda: robot.drive("packing"), robot.cancel),
-                        Condition("at(packing)", lambda: robot.at("packing")),
+                        Try(
+                            "fetch(saw,b1)",
+                            lambda: robot.fetch("saw", "b1"),
+                            robot.cancel,
+                            keep=False,
+                        ),
                     ),
                 ),
-                Latch(
+                sequence(
+                    "sequence",
+                    Condition("at(b1)", lambda: robot.at("b1")),
+                    Try("drive(packing)", lambda: robot.drive("packing"), robot.cancel, keep=False),
+                ),
+                Try(
                     "hand_in(saw,packing)",
                     lambda: robot.hand_in("saw", "packing"),
                     robot.cancel,
+                    keep=False,
                 ),
-                Condition("delivered(saw)", lambda: robot.delivered("saw")),
-            ),
-            sequence(
-                "sequence for delivered(saw)",
-                Condition("loaded(saw)", lambda: robot.loaded("saw")),
-                Condition("at(packing)", lambda: robot.at("packing")),
-                Latch(
-                    "hand_in(saw,packing)",
-                    lambda: robot.hand_in("saw", "packing"),
-                    robot.cancel,
-                ),
-                Condition("delivered(saw)", lambda: robot.delivered("saw")),
-            ),
-            sequence(
-                "sequence for delivered(saw)",
-                Condition("loaded(saw)", lambda: robot.loaded("saw")),
-                Condition("at(packing)", lambda: robot.at("packing")),
-                Latch(
-                    "hand_in(saw,packing)",
-                    lambda: robot.hand_in("saw", "packing"),
-                    robot.cancel,
-                ),
-                Condition("delivered(saw)", lambda: robot.delivered("saw")),
-            ),
-            sequence(
-                "sequence for delivered(saw)",
-                Condition("loaded(saw)", lambda: robot.loaded("saw")),
-                Condition("at(packing)", lambda: robot.at("packing")),
-                Latch(
-                    "hand_in(saw,packing)",
-                    lambda: robot.hand_in("saw", "packing"),
-                    robot.cancel,
-                ),
-                Condition("delivered(saw)", lambda: robot.delivered("saw")),
             ),
         ),
     )
@@ -550,9 +488,6 @@ class SimulatedWorld(World):
 
     def loaded(self, item: str) -> bool:
         return self._value("loaded", item) is True
-
-    def stored(self, item: str, shelf: str) -> bool:
-        return self._value("stored", item, shelf) is True
 
     def drive(self, to: str) -> Status:
         return self._act("drive", to)

@@ -1,6 +1,6 @@
 """Behavior tree for the problem one-order of the domain warehouse. Made by bbtc.
 
-In the model of that domain it succeeds with probability 25893/32000.
+In the model of that domain it succeeds with probability 82971/100000.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -60,25 +60,6 @@ class Robot(Protocol):
 
     def scan(self, item: str, shelf: str) -> Status:
         """Start or continue scan(item, shelf)."""
-
-
-def all_of(*values: bool | None) -> bool | None:
-    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
-    if False in values:
-        return False
-    return None if None in values else True
-
-
-def any_of(*values: bool | None) -> bool | None:
-    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
-    if True in values:
-        return True
-    return None if None in values else False
-
-
-def negated(value: bool | None) -> bool | None:
-    """Three-valued "not": unknown stays unknown."""
-    return None if value is None else not value
 
 
 class Condition(Behaviour):
@@ -171,6 +152,50 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -204,6 +229,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -271,179 +301,96 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("delivered(drill)", lambda: robot.delivered("drill")),
-            sequence(
-                "sequence for delivered(drill)",
-                fallback(
-                    "fallback",
-                    Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                    sequence(
-                        "sequence for loaded(drill)",
-                        fallback(
-                            "search(drill)",
-                            sequence(
-                                "search_shelf(drill,a1)",
-                                fallback(
-                                    "fallback",
-                                    Condition("at(a1)", lambda: robot.at("a1")),
-                                    Latch(
-                                        "drive(a1)",
-                                        lambda: robot.drive("a1"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.at("a1")),
-                                            any_of(
-                                                robot.at("a1"),
-                                                robot.at("packing"),
-                                                robot.at("a2"),
-                                            ),
-                                        ),
-                                    ),
-                                ),
-                                skipper(
-                                    "skipper",
-                                    Condition(
-                                        "stored(drill,a1)",
-                                        lambda: robot.stored("drill", "a1"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        Latch(
-                                            "scan(drill,a1)",
-                                            lambda: robot.scan("drill", "a1"),
-                                            robot.cancel,
-                                            guard=lambda: all_of(
-                                                robot.at("a1"),
-                                                robot.stored("drill", "a1") is None,
-                                            ),
-                                        ),
-                                        Condition(
-                                            "known stored(drill,a1)",
-                                            lambda: robot.stored("drill", "a1") is not None,
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "fetch(drill,a1)",
-                                    lambda: robot.fetch("drill", "a1"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.at("a1"),
-                                        robot.stored("drill", "a1"),
-                                        negated(robot.loaded("drill")),
-                                    ),
-                                ),
-                                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                            ),
-                            sequence(
-                                "search_shelf(drill,a2)",
-                                fallback(
-                                    "fallback",
-                                    Condition("at(a2)", lambda: robot.at("a2")),
-                                    Latch(
-                                        "drive(a2)",
-                                        lambda: robot.drive("a2"),
-                                        robot.cancel,
-                                        guard=lambda: all_of(
-                                            negated(robot.at("a2")),
-                                            any_of(
-                                                robot.at("a2"),
-                                                robot.at("a1"),
-                                                robot.at("packing"),
-                                            ),
-                                        ),
-                                    ),
-                                ),
-                                skipper(
-                                    "skipper",
-                                    Condition(
-                                        "stored(drill,a2)",
-                                        lambda: robot.stored("drill", "a2"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        Latch(
-                                            "scan(drill,a2)",
-                                            lambda: robot.scan("drill", "a2"),
-                                            robot.cancel,
-                                            guard=lambda: all_of(
-                                                robot.at("a2"),
-                                                robot.stored("drill", "a2") is None,
-                                            ),
-                                        ),
-                                        Condition(
-                                            "known stored(drill,a2)",
-                                            lambda: robot.stored("drill", "a2") is not None,
-                                        ),
-                                    ),
-                                ),
-                                Latch(
-                                    "fetch(drill,a2)",
-                                    lambda: robot.fetch("drill", "a2"),
-                                    robot.cancel,
-                                    guard=lambda: all_of(
-                                        robot.at("a2"),
-                                        robot.stored("drill", "a2"),
-                                        negated(robot.loaded("drill")),
-                                    ),
-                                ),
-                                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                            ),
-                        ),
+            retry(
+                "retry",
+                8,
+                sequence(
+                    "sequence",
+                    fallback(
+                        "fallback",
                         Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                    ),
-                ),
-                fallback(
-                    "fallback",
-                    Condition("at(packing)", lambda: robot.at("packing")),
-                    sequence(
-                        "sequence for at(packing)",
-                        Condition(
-                            "(at(packing) or at(a1) or at(a2))",
-                            lambda: any_of(robot.at("packing"), robot.at("a1"), robot.at("a2")),
+                        sequence(
+                            "sequence",
+                            skipper(
+                                "skipper",
+                                Condition("stored(drill,a1)", lambda: robot.stored("drill", "a1")),
+                                sequence(
+                                    "sequence",
+                                    fallback(
+                                        "fallback",
+                                        Condition("at(a1)", lambda: robot.at("a1")),
+                                        Try(
+                                            "drive(a1)",
+                                            lambda: robot.drive("a1"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                    Try(
+                                        "scan(drill,a1)",
+                                        lambda: robot.scan("drill", "a1"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                            ),
+                            Try(
+                                "fetch(drill,a1)",
+                                lambda: robot.fetch("drill", "a1"),
+                                robot.cancel,
+                                keep=False,
+                            ),
                         ),
-                        Latch("drive(packing)", lambda: robot.drive("packing"), robot.cancel),
+                        sequence(
+                            "sequence",
+                            skipper(
+                                "skipper",
+                                Condition("stored(drill,a2)", lambda: robot.stored("drill", "a2")),
+                                sequence(
+                                    "sequence",
+                                    fallback(
+                                        "fallback",
+                                        Condition("at(a2)", lambda: robot.at("a2")),
+                                        Try(
+                                            "drive(a2)",
+                                            lambda: robot.drive("a2"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                    Try(
+                                        "scan(drill,a2)",
+                                        lambda: robot.scan("drill", "a2"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                            ),
+                            Try(
+                                "fetch(drill,a2)",
+                                lambda: robot.fetch("drill", "a2"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                    ),
+                    fallback(
+                        "fallback",
                         Condition("at(packing)", lambda: robot.at("packing")),
+                        Try(
+                            "drive(packing)",
+                            lambda: robot.drive("packing"),
+                            robot.cancel,
+                            keep=False,
+                        ),
+                    ),
+                    Try(
+                        "hand_in(drill,packing)",
+                        lambda: robot.hand_in("drill", "packing"),
+                        robot.cancel,
+                        keep=False,
                     ),
                 ),
-                Latch(
-                    "hand_in(drill,packing)",
-                    lambda: robot.hand_in("drill", "packing"),
-                    robot.cancel,
-                ),
-                Condition("delivered(drill)", lambda: robot.delivered("drill")),
-            ),
-            sequence(
-                "sequence for delivered(drill)",
-                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                Condition("at(packing)", lambda: robot.at("packing")),
-                Latch(
-                    "hand_in(drill,packing)",
-                    lambda: robot.hand_in("drill", "packing"),
-                    robot.cancel,
-                ),
-                Condition("delivered(drill)", lambda: robot.delivered("drill")),
-            ),
-            sequence(
-                "sequence for delivered(drill)",
-                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                Condition("at(packing)", lambda: robot.at("packing")),
-                Latch(
-                    "hand_in(drill,packing)",
-                    lambda: robot.hand_in("drill", "packing"),
-                    robot.cancel,
-                ),
-                Condition("delivered(drill)", lambda: robot.delivered("drill")),
-            ),
-            sequence(
-                "sequence for delivered(drill)",
-                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                Condition("at(packing)", lambda: robot.at("packing")),
-                Latch(
-                    "hand_in(drill,packing)",
-                    lambda: robot.hand_in("drill", "packing"),
-                    robot.cancel,
-                ),
-                Condition("delivered(drill)", lambda: robot.delivered("drill")),
             ),
         ),
     )

@@ -1,0 +1,895 @@
+"""Behavior tree for the problem two-goals of the domain service-robot. Made by bbtc.
+
+In the model of that domain it succeeds with probability 95863550171240514325017033/100000000000000000000000000.
+Implement the class Robot, and run
+
+    run(create_root(MyRobot()), period=0.1)
+
+As a program, this module runs the tree in a simulated world (--help tells how).
+It needs py_trees 2.2 or later.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import time
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite, Selector, Sequence
+from py_trees.decorators import Decorator
+from py_trees.trees import BehaviourTree
+
+
+class Robot(Protocol):
+    """What the tree needs of a robot.
+
+    A condition answers at once: True, False, or None where it is unknown. An action is called in
+    every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
+    conditions show what it did.
+    """
+
+    def cancel(self, action: str) -> None:
+        """The running action, named as in the tree, is no longer wanted."""
+
+    def at(self, item: str, spot: str) -> bool | None:
+        """Whether at(item, spot) holds; None where that is unknown."""
+
+    def holding(self, item: str) -> bool:
+        """Whether holding(item) holds."""
+
+    def near(self, spot: str) -> bool:
+        """Whether near(spot) holds."""
+
+    def is_open(self, spot: str) -> bool:
+        """Whether open(spot) holds."""
+
+    def look_for(self, item: str, spot: str) -> Status:
+        """Start or continue look_for(item, spot)."""
+
+    def open(self, spot: str) -> Status:
+        """Start or continue open(spot)."""
+
+    def pick(self, item: str, spot: str) -> Status:
+        """Start or continue pick(item, spot)."""
+
+    def place(self, item: str, spot: str) -> Status:
+        """Start or continue place(item, spot)."""
+
+    def walk(self, to: str) -> Status:
+        """Start or continue walk(to)."""
+
+
+class Condition(Behaviour):
+    """SUCCESS, FAILURE or RUNNING for a condition that is True, False or None (unknown)."""
+
+    def __init__(self, name: str, read: Callable[[], bool | None]) -> None:
+        super().__init__(name=name)
+        self._read = read
+
+    def update(self) -> Status:
+        value = self._read()
+        if value is None:
+            return Status.RUNNING
+        return Status.SUCCESS if value else Status.FAILURE
+
+
+class Action(Behaviour):
+    """Calls the robot at every tick until the action ends; cancels it if it is no longer wanted."""
+
+    def __init__(self, name: str, act: Callable[[], Status], cancel: Callable[[str], None]) -> None:
+        super().__init__(name=name)
+        self._act = act
+        self._cancel = cancel
+
+    def update(self) -> Status:
+        status = self._act()
+        if status not in (Status.SUCCESS, Status.FAILURE, Status.RUNNING):
+            raise TypeError(f"{self.name} returned {status!r}, not SUCCESS, FAILURE or RUNNING")
+        return status
+
+    def terminate(self, new_status: Status) -> None:
+        if self.status == Status.RUNNING and new_status == Status.INVALID:
+            self._cancel(self.name)
+
+
+class Latch(Decorator):
+    """Runs its action once and returns how it ended at every later tick. The status is withheld
+    until the next tick, because conditions to the left were read before the action's effect. An
+    action interrupted after its start counts as run. A guard must be True for it to start; with
+    ``keep=False`` it starts again whenever it is ticked."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name=name, child=Action(name, act, cancel))
+        self._guard = guard
+        self._keep = keep
+        self._started = False
+        self._final: Status | None = None
+
+    def tick(self) -> Iterator[Behaviour]:
+        if self._final is not None:
+            self.stop(self._final)
+            yield self
+            return
+        ready = True if self._started or self._guard is None else self._guard()
+        if ready:
+            self._announce()
+            self._started = True
+            yield from self.decorated.tick()
+            if self.decorated.status != Status.RUNNING:
+                self._end(self.decorated.status)
+        if ready or ready is None:
+            self.status = Status.RUNNING
+        else:
+            self.stop(Status.FAILURE)
+        yield self
+
+    def update(self) -> Status:
+        return self.status
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status == Status.INVALID and self._started:
+            self._end(Status.SUCCESS)
+
+    def _announce(self) -> None:
+        above = self.parent
+        while above is not None and not isinstance(above, StopWhenBlocked):
+            above = above.parent
+        if above is not None:
+            above.acts(self)
+
+    def _end(self, status: Status) -> None:
+        self._started = False
+        self._final = status if self._keep else None
+
+
+class Retry(Decorator):
+    """Returns what its child returns, and bounds how many actions may start below it: every start
+    is an attempt, and when all are used up, a further action fails instead of starting."""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.made = 0
+
+    def update(self) -> Status:
+        return self.decorated.status
+
+
+class Try(Latch):
+    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+    ) -> None:
+        super().__init__(name, act, cancel, self._attempt, keep)
+        self._allowed = guard
+
+    def _attempt(self) -> bool | None:
+        allowed = True if self._allowed is None else self._allowed()
+        if not allowed:
+            return allowed
+        retries: list[Retry] = []
+        above = self.parent
+        while above is not None:
+            if isinstance(above, Retry):
+                retries.append(above)
+            above = above.parent
+        if any(retry.made >= retry.attempts for retry in retries):
+            return False
+        for retry in retries:
+            retry.made += 1
+        return True
+
+
+class Skipper(Composite):
+    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
+
+    def tick(self) -> Iterator[Behaviour]:
+        status = Status.RUNNING
+        for child in self.children:
+            yield from child.tick()
+            self.current_child = child
+            status = child.status
+            if status != Status.RUNNING:
+                break
+        if status != Status.RUNNING:
+            for child in self.children:
+                if child is not self.current_child and child.status != Status.INVALID:
+                    child.stop(Status.INVALID)
+            self.stop(status)
+        self.status = status
+        yield self
+
+
+def sequence(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children succeed. Every tick starts at the first child."""
+    return Sequence(name, memory=False, children=list(children))
+
+
+def fallback(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children fail. Every tick starts at the first child."""
+    return Selector(name, memory=False, children=list(children))
+
+
+def skipper(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children are running. Every tick starts at the first child."""
+    return Skipper(name, children=list(children))
+
+
+def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Lets at most so many actions start below."""
+    return Retry(name, attempts, child)
+
+
+@runtime_checkable
+class WithSetup(Protocol):
+    """A robot that prepares itself before the first tick."""
+
+    def setup(self, **kwargs: Any) -> None:
+        """Called once, with what the owner of the tree hands on: in py_trees_ros, ``node``."""
+
+
+class StopWhenBlocked(Decorator):
+    """The root: FAILURE where the tree is RUNNING but no action is. Something is unknown then that
+    nothing can observe, and nothing would ever change."""
+
+    def __init__(self, robot: object, child: Behaviour) -> None:
+        super().__init__(name="stop when blocked", child=child)
+        self._robot = robot
+        self._acting = False
+        self._last: Latch | None = None
+
+    def setup(self, **kwargs: Any) -> None:
+        if isinstance(self._robot, WithSetup):
+            self._robot.setup(**kwargs)
+
+    def acts(self, latch: Latch) -> None:
+        """A latch below is about to run its action in this tick."""
+        # py_trees would interrupt the action that ran before only after this one has started: the
+        # robot, asked for the same action by both, could not tell the second from the first.
+        if self._last is not None and self._last is not latch and self._last.status == Status.RUNNING:
+            self._last.stop(Status.INVALID)
+        self._last = latch
+        self._acting = True
+
+    def tick(self) -> Iterator[Behaviour]:
+        self._acting = False
+        yield from super().tick()
+
+    def update(self) -> Status:
+        if self.decorated.status == Status.RUNNING and not self._acting:
+            self.feedback_message = "blocked: nothing can observe what is unknown"
+            return Status.FAILURE
+        return self.decorated.status
+
+
+def run(root: Behaviour, period: float = 0.0) -> Status:
+    """Set a tree up and tick it until it ends, with a pause of ``period`` seconds between ticks.
+    An exception, such as that of Ctrl-C, cancels the action that runs."""
+    tree = BehaviourTree(root)
+    tree.setup()
+    try:
+        while True:
+            tree.tick()
+            if root.status != Status.RUNNING:
+                return root.status
+            time.sleep(period)
+    finally:
+        if root.status == Status.RUNNING:
+            root.stop(Status.INVALID)
+
+
+def create_root(robot: Robot) -> Behaviour:
+    """The tree. Latches stay latched, so it runs once: make a new one for another run."""
+    return StopWhenBlocked(
+        robot,
+        retry(
+            "retry",
+            17,
+            sequence(
+                "sequence",
+                fallback(
+                    "fallback",
+                    Condition("at(cup1,cupboard4)", lambda: robot.at("cup1", "cupboard4")),
+                    sequence(
+                        "sequence",
+                        fallback(
+                            "fallback",
+                            Condition("open(cupboard4)", lambda: robot.is_open("cupboard4")),
+                            sequence(
+                                "sequence",
+                                fallback(
+                                    "fallback",
+                                    Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
+                                    Try(
+                                        "walk(cupboard4)",
+                                        lambda: robot.walk("cupboard4"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                                Try(
+                                    "open(cupboard4)",
+                                    lambda: robot.open("cupboard4"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                        ),
+                        fallback(
+                            "fallback",
+                            Condition("holding(cup1)", lambda: robot.holding("cup1")),
+                            sequence(
+                                "sequence",
+                                fallback(
+                                    "fallback",
+                                    Condition("near(table1)", lambda: robot.near("table1")),
+                                    Try(
+                                        "walk(table1)",
+                                        lambda: robot.walk("table1"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                                Try(
+                                    "pick(cup1,table1)",
+                                    lambda: robot.pick("cup1", "table1"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                        ),
+                        fallback(
+                            "fallback",
+                            Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
+                            Try(
+                                "walk(cupboard4)",
+                                lambda: robot.walk("cupboard4"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                        Try(
+                            "place(cup1,cupboard4)",
+                            lambda: robot.place("cup1", "cupboard4"),
+                            robot.cancel,
+                            keep=False,
+                        ),
+                    ),
+                ),
+                fallback(
+                    "fallback",
+                    Condition("at(book3,drawer6)", lambda: robot.at("book3", "drawer6")),
+                    sequence(
+                        "sequence",
+                        fallback(
+                            "fallback",
+                            Condition("open(drawer6)", lambda: robot.is_open("drawer6")),
+                            sequence(
+                                "sequence",
+                                fallback(
+                                    "fallback",
+                                    Condition("near(drawer6)", lambda: robot.near("drawer6")),
+                                    Try(
+                                        "walk(drawer6)",
+                                        lambda: robot.walk("drawer6"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                                Try(
+                                    "open(drawer6)",
+                                    lambda: robot.open("drawer6"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                        ),
+                        fallback(
+                            "fallback",
+                            Condition("holding(book3)", lambda: robot.holding("book3")),
+                            sequence(
+                                "sequence",
+                                skipper(
+                                    "skipper",
+                                    Condition(
+                                        "at(book3,counter5)",
+                                        lambda: robot.at("book3", "counter5"),
+                                    ),
+                                    sequence(
+                                        "sequence",
+                                        fallback(
+                                            "fallback",
+                                            Condition(
+                                                "near(counter5)",
+                                                lambda: robot.near("counter5"),
+                                            ),
+                                            Try(
+                                                "walk(counter5)",
+                                                lambda: robot.walk("counter5"),
+                                                robot.cancel,
+                                                keep=False,
+                                            ),
+                                        ),
+                                        Try(
+                                            "look_for(book3,counter5)",
+                                            lambda: robot.look_for("book3", "counter5"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                ),
+                                Try(
+                                    "pick(book3,counter5)",
+                                    lambda: robot.pick("book3", "counter5"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                            sequence(
+                                "sequence",
+                                skipper(
+                                    "skipper",
+                                    Condition(
+                                        "at(book3,cupboard4)",
+                                        lambda: robot.at("book3", "cupboard4"),
+                                    ),
+                                    sequence(
+                                        "sequence",
+                                        fallback(
+                                            "fallback",
+                                            Condition(
+                                                "near(cupboard4)",
+                                                lambda: robot.near("cupboard4"),
+                                            ),
+                                            Try(
+                                                "walk(cupboard4)",
+                                                lambda: robot.walk("cupboard4"),
+                                                robot.cancel,
+                                                keep=False,
+                                            ),
+                                        ),
+                                        Try(
+                                            "look_for(book3,cupboard4)",
+                                            lambda: robot.look_for("book3", "cupboard4"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                ),
+                                Try(
+                                    "pick(book3,cupboard4)",
+                                    lambda: robot.pick("book3", "cupboard4"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                            sequence(
+                                "sequence",
+                                skipper(
+                                    "skipper",
+                                    Condition(
+                                        "at(book3,shelf3)",
+                                        lambda: robot.at("book3", "shelf3"),
+                                    ),
+                                    sequence(
+                                        "sequence",
+                                        fallback(
+                                            "fallback",
+                                            Condition("near(shelf3)", lambda: robot.near("shelf3")),
+                                            Try(
+                                                "walk(shelf3)",
+                                                lambda: robot.walk("shelf3"),
+                                                robot.cancel,
+                                                keep=False,
+                                            ),
+                                        ),
+                                        Try(
+                                            "look_for(book3,shelf3)",
+                                            lambda: robot.look_for("book3", "shelf3"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                ),
+                                Try(
+                                    "pick(book3,shelf3)",
+                                    lambda: robot.pick("book3", "shelf3"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                        ),
+                        fallback(
+                            "fallback",
+                            Condition("near(drawer6)", lambda: robot.near("drawer6")),
+                            Try(
+                                "walk(drawer6)",
+                                lambda: robot.walk("drawer6"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                        Try(
+                            "place(book3,drawer6)",
+                            lambda: robot.place("book3", "drawer6"),
+                            robot.cancel,
+                            keep=False,
+                        ),
+                    ),
+                ),
+            ),
+        ),
+    )
+
+
+Fact = tuple[str, ...]
+State = dict[Fact, bool | None]
+T = TypeVar("T")
+
+
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
+
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
+        self.changes = changes
+
+
+class Outcome:
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
+
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
+        self.then = then or []
+
+
+Factor = list[Outcome]
+
+
+def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
+    """One of the values, with exactly the given probabilities."""
+    weights = [Fraction(probability) for probability, _ in choices]
+    whole = math.lcm(*(weight.denominator for weight in weights))
+    point = rng.randrange(whole)
+    for weight, (_, value) in zip(weights, choices, strict=True):
+        point -= int(weight * whole)
+        if point < 0:
+            return value
+    return choices[-1][1]
+
+
+def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
+    """What an action changes: one outcome of every factor. All conditions are read before any
+    change; where changes clash, True wins over None (unknown), and None over False."""
+    changes: State = {}
+    strength = {False: 0, None: 1, True: 2}
+    for factor in factors:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
+            for fact, value in part.items():
+                if fact not in changes or strength[value] > strength[changes[fact]]:
+                    changes[fact] = value
+    return changes
+
+
+class World:
+    """A world that behaves as the domain says, by chance. The outcome of an action applies at
+    once; the tree looks at it in the next tick."""
+
+    def __init__(
+        self,
+        initial: list[tuple[str, State]],
+        actions: dict[Fact, list[Factor]],
+        rng: random.Random,
+        report: Callable[[str], None],
+    ) -> None:
+        start: State = draw(rng, initial)
+        self._state = dict(start)
+        self._actions = actions
+        self._rng = rng
+        self._report = report
+
+    def cancel(self, action: str) -> None:
+        """Nothing to do: no action here runs for longer than a tick."""
+
+    def _value(self, *fact: str) -> bool | None:
+        return self._state[fact]
+
+    def _act(self, *action: str) -> Status:
+        changes = happen(self._rng, self._actions[action], self._state)
+        self._state.update(changes)
+        words = {True: "true", False: "false", None: "unknown"}
+        told = ", ".join(f"{in_words(fact)} {words[value]}" for fact, value in changes.items())
+        self._report(f"{in_words(action)}: {told or 'no change'}")
+        return Status.SUCCESS
+
+
+def in_words(fact: Fact) -> str:
+    """``predicate(object,…)``."""
+    return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) -> None:
+    """Run trees in the simulated world as the command line says; ``make`` makes one."""
+    parser = argparse.ArgumentParser(description="Run the tree in a simulated world.")
+    parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default: 0)")
+    parser.add_argument("--runs", type=int, default=1, help="with more than one, count successes")
+    options = parser.parse_args()
+    rng = random.Random(options.seed)
+    if options.runs == 1:
+        status = run(make(rng, print))
+        print(f"The tree returned {status.value}.")
+    else:
+        ends = [run(make(rng, lambda _: None)) for _ in range(options.runs)]
+        print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
+
+
+INITIAL: list[tuple[str, State]] = [
+    (
+        "1",
+        {
+            ("at", "book3", "counter5"): None,
+            ("at", "book3", "cupboard4"): None,
+            ("at", "book3", "drawer6"): False,
+            ("at", "book3", "shelf3"): None,
+            ("at", "cup1", "cupboard4"): False,
+            ("at", "cup1", "table1"): True,
+            ("hand_free",): True,
+            ("holding", "book3"): False,
+            ("holding", "cup1"): False,
+            ("near", "counter5"): False,
+            ("near", "cupboard4"): False,
+            ("near", "drawer6"): False,
+            ("near", "fridge2"): False,
+            ("near", "shelf3"): False,
+            ("near", "table1"): True,
+            ("open", "cupboard4"): False,
+            ("open", "drawer6"): False,
+        },
+    ),
+]
+"""The states a run may start in, with their probabilities."""
+
+
+ACTIONS: dict[Fact, list[Factor]] = {
+    ("look_for", "book3", "counter5"): [
+        [
+            Outcome("3/4", {("at", "book3", "counter5"): True}),
+            Outcome("1/4", {("at", "book3", "counter5"): False}),
+        ],
+    ],
+    ("look_for", "book3", "cupboard4"): [
+        [
+            Outcome("3/4", {("at", "book3", "cupboard4"): True}),
+            Outcome("1/4", {("at", "book3", "cupboard4"): False}),
+        ],
+    ],
+    ("look_for", "book3", "shelf3"): [
+        [
+            Outcome("3/4", {("at", "book3", "shelf3"): True}),
+            Outcome("1/4", {("at", "book3", "shelf3"): False}),
+        ],
+    ],
+    ("open", "cupboard4"): [[Outcome("19/20", {("open", "cupboard4"): True}), Outcome("1/20", {})]],
+    ("open", "drawer6"): [[Outcome("19/20", {("open", "drawer6"): True}), Outcome("1/20", {})]],
+    ("pick", "book3", "counter5"): [
+        [
+            Outcome(
+                "9/10",
+                {
+                    ("at", "book3", "counter5"): False,
+                    ("hand_free",): False,
+                    ("holding", "book3"): True,
+                },
+            ),
+            Outcome("1/10", {}),
+        ],
+    ],
+    ("pick", "book3", "cupboard4"): [
+        [
+            Outcome(
+                "9/10",
+                {
+                    ("at", "book3", "cupboard4"): False,
+                    ("hand_free",): False,
+                    ("holding", "book3"): True,
+                },
+            ),
+            Outcome("1/10", {}),
+        ],
+    ],
+    ("pick", "book3", "shelf3"): [
+        [
+            Outcome(
+                "9/10",
+                {
+                    ("at", "book3", "shelf3"): False,
+                    ("hand_free",): False,
+                    ("holding", "book3"): True,
+                },
+            ),
+            Outcome("1/10", {}),
+        ],
+    ],
+    ("pick", "cup1", "table1"): [
+        [
+            Outcome(
+                "9/10",
+                {("at", "cup1", "table1"): False, ("hand_free",): False, ("holding", "cup1"): True},
+            ),
+            Outcome("1/10", {}),
+        ],
+    ],
+    ("place", "book3", "drawer6"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "book3", "drawer6"): True,
+                    ("hand_free",): True,
+                    ("holding", "book3"): False,
+                },
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("place", "cup1", "cupboard4"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "cup1", "cupboard4"): True,
+                    ("hand_free",): True,
+                    ("holding", "cup1"): False,
+                },
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("walk", "counter5"): [
+        [
+            Outcome(
+                "49/50",
+                {
+                    ("near", "counter5"): True,
+                    ("near", "cupboard4"): False,
+                    ("near", "drawer6"): False,
+                    ("near", "fridge2"): False,
+                    ("near", "shelf3"): False,
+                    ("near", "table1"): False,
+                },
+            ),
+            Outcome("1/50", {}),
+        ],
+    ],
+    ("walk", "cupboard4"): [
+        [
+            Outcome(
+                "49/50",
+                {
+                    ("near", "counter5"): False,
+                    ("near", "cupboard4"): True,
+                    ("near", "drawer6"): False,
+                    ("near", "fridge2"): False,
+                    ("near", "shelf3"): False,
+                    ("near", "table1"): False,
+                },
+            ),
+            Outcome("1/50", {}),
+        ],
+    ],
+    ("walk", "drawer6"): [
+        [
+            Outcome(
+                "49/50",
+                {
+                    ("near", "counter5"): False,
+                    ("near", "cupboard4"): False,
+                    ("near", "drawer6"): True,
+                    ("near", "fridge2"): False,
+                    ("near", "shelf3"): False,
+                    ("near", "table1"): False,
+                },
+            ),
+            Outcome("1/50", {}),
+        ],
+    ],
+    ("walk", "shelf3"): [
+        [
+            Outcome(
+                "49/50",
+                {
+                    ("near", "counter5"): False,
+                    ("near", "cupboard4"): False,
+                    ("near", "drawer6"): False,
+                    ("near", "fridge2"): False,
+                    ("near", "shelf3"): True,
+                    ("near", "table1"): False,
+                },
+            ),
+            Outcome("1/50", {}),
+        ],
+    ],
+    ("walk", "table1"): [
+        [
+            Outcome(
+                "49/50",
+                {
+                    ("near", "counter5"): False,
+                    ("near", "cupboard4"): False,
+                    ("near", "drawer6"): False,
+                    ("near", "fridge2"): False,
+                    ("near", "shelf3"): False,
+                    ("near", "table1"): True,
+                },
+            ),
+            Outcome("1/50", {}),
+        ],
+    ],
+}
+"""What each action does: independent choices between outcomes."""
+
+
+class SimulatedWorld(World):
+    """Plays the robot."""
+
+    def at(self, item: str, spot: str) -> bool | None:
+        return self._value("at", item, spot)
+
+    def holding(self, item: str) -> bool:
+        return self._value("holding", item) is True
+
+    def near(self, spot: str) -> bool:
+        return self._value("near", spot) is True
+
+    def is_open(self, spot: str) -> bool:
+        return self._value("open", spot) is True
+
+    def look_for(self, item: str, spot: str) -> Status:
+        return self._act("look_for", item, spot)
+
+    def open(self, spot: str) -> Status:
+        return self._act("open", spot)
+
+    def pick(self, item: str, spot: str) -> Status:
+        return self._act("pick", item, spot)
+
+    def place(self, item: str, spot: str) -> Status:
+        return self._act("place", item, spot)
+
+    def walk(self, to: str) -> Status:
+        return self._act("walk", to)
+
+
+def main() -> None:
+    """Run the tree in the simulated world."""
+    simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+
+if __name__ == "__main__":
+    main()
