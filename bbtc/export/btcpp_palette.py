@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
 from bbtc.export.btcpp_idioms import LATCH, SKIPPER, Profile
@@ -17,6 +18,8 @@ from bbtc.ground.task import Task
 from bbtc.tree.nodes import Tree
 
 _MOST_OBJECTS = 8
+
+_Objects: TypeAlias = Mapping[tuple[str, str, int], Mapping[str, None]]
 
 
 def node_model(
@@ -58,19 +61,30 @@ def _entry(
     kind: str,
     leaf: Leaf,
     names: BtcppNames,
-    objects: Mapping[tuple[str, str, int], dict[str, None]],
+    objects: _Objects,
 ) -> None:
     element = SubElement(model, kind, ID=names.ids[leaf.symbol])
-    for position, port in enumerate(leaf.parameters):
-        known = objects.get((leaf.symbol.kind, leaf.symbol.name, position), {})
-        listed = [names.values[name] for name in known][:_MOST_OBJECTS]
-        more = ", …" if len(known) > _MOST_OBJECTS else ""
-        text = f"such as {', '.join(listed)}{more}" if listed else ""
+    for port, text in zip(leaf.parameters, _port_text(names, objects, leaf), strict=True):
         SubElement(element, "input_port", name=port, type="std::string").text = text or None
     SubElement(element, "description").text = meaning(leaf)
 
 
-def _objects(task: Task) -> dict[tuple[str, str, int], dict[str, None]]:
+def port_text(task: Task, names: BtcppNames, leaf: Leaf) -> list[str]:
+    """What is said of each port of a leaf: some of the objects that may stand there."""
+    return _port_text(names, _objects(task), leaf)
+
+
+def _port_text(names: BtcppNames, objects: _Objects, leaf: Leaf) -> list[str]:
+    texts = []
+    for position in range(leaf.symbol.arity):
+        known = objects.get((leaf.symbol.kind, leaf.symbol.name, position), {})
+        listed = [names.values[name] for name in known][:_MOST_OBJECTS]
+        more = ", …" if len(known) > _MOST_OBJECTS else ""
+        texts.append(f"such as {', '.join(listed)}{more}" if listed else "")
+    return texts
+
+
+def _objects(task: Task) -> _Objects:
     """The objects that a task puts at each position of a predicate or action."""
     found: dict[tuple[str, str, int], dict[str, None]] = {}
     for variable in task.variables:

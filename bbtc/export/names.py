@@ -30,6 +30,8 @@ _WORDS = re.compile(r"[A-Za-z0-9]+")
 PYTHON_RESERVED = frozenset(keyword.kwlist) | {"self", "bool", "str", "cancel", "setup"}
 """Names that a method of a generated interface cannot have, whatever the letter case."""
 
+_ROS_PORTS = ("action_name", "service_name", "topic_name")  # ports that leaves of behaviortree_ros2 have
+
 Kind = Literal["predicate", "action", "parameter"]
 Style = Literal["camel", "snake"]
 
@@ -81,7 +83,7 @@ def parameter_names(names: Sequence[str]) -> tuple[str, ...]:
     symbols = [Symbol("parameter", name, 0) for name in names]
     if len(set(names)) < len(names):
         return parameter_names([f"arg{position}" for position, _ in enumerate(names, 1)])
-    table = identifiers(symbols, "snake", {"name", "id", "robot", *PYTHON_RESERVED})
+    table = identifiers(symbols, "snake", {"name", "id", "robot", *_ROS_PORTS, *PYTHON_RESERVED})
     return tuple(table[symbol] for symbol in symbols)
 
 

@@ -84,6 +84,7 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
         "png": "bbtc.export.graphviz:png",
         "btcpp": "bbtc.export.btcpp:btcpp",
         "btcpp_palette": "bbtc.export.btcpp_palette:btcpp_palette",
+        "btcpp_project": "bbtc.export.btcpp_project:btcpp_project",
         "py_trees": "bbtc.export.pytrees:py_trees",
         "py_trees_robot": "bbtc.export.pytrees_robot:py_trees_robot",
         "prism": "bbtc.export.prism:prism",

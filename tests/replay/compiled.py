@@ -66,6 +66,11 @@ def _prefix() -> Iterator[str]:
         yield f"CMAKE_PREFIX_PATH={os.environ['CMAKE_PREFIX_PATH'].replace(os.pathsep, ';')}"
 
 
+def library_prefix() -> list[str]:
+    """The folders where the library may be, as far as the environment names them."""
+    return [path for path in os.environ.get("CMAKE_PREFIX_PATH", "").split(os.pathsep) if path]
+
+
 def require_library() -> None:
     """Skip the test where nothing can be compiled with BehaviorTree.CPP."""
     reason = missing_library()

@@ -1,0 +1,19 @@
+#pragma once
+#include <behaviortree_ros2/ros_node_params.hpp>
+
+namespace BT {
+enum ServiceNodeErrorCode { SERVICE_UNREACHABLE };
+
+template <class ServiceT>
+class RosServiceNode : public RosStubNode {
+ public:
+  using Request = typename ServiceT::Request;
+  using Response = typename ServiceT::Response;
+  using RosStubNode::RosStubNode;
+  static PortsList providedBasicPorts(PortsList addition) { return withBasic("service_name", addition); }
+  static PortsList providedPorts() { return providedBasicPorts({}); }
+  virtual bool setRequest(typename Request::SharedPtr& request) = 0;
+  virtual NodeStatus onResponseReceived(const typename Response::SharedPtr& response) = 0;
+  virtual NodeStatus onFailure(ServiceNodeErrorCode) { return NodeStatus::FAILURE; }
+};
+}  // namespace BT

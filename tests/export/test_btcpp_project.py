@@ -1,0 +1,288 @@
+"""The C++ program for a tree: it compiles and does what the tree does, whatever the names. The tests that
+compile skip where CMake finds no BehaviorTree.CPP."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bbtc.export import cppcode
+from bbtc.export.btcpp_project import btcpp_project
+from bbtc.ground.condition import TRUE, And, Is, Known
+from bbtc.ground.task import (
+    Effect,
+    Factor,
+    GroundAction,
+    InitialState,
+    Outcome,
+    Signature,
+    Task,
+    Variable,
+)
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.pipeline import simulate_tree
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
+from tests.domains.problems import PROBLEMS, plan_of
+from tests.replay.compiled import cmake_build, library_prefix, require_library
+from tests.strategies import HOSTILE_NAMES, soda_tree
+
+STUBS = Path(__file__).parent / "ros_stubs"
+
+
+def files(tree: Tree, **options: str) -> dict[str, str]:
+    return dict(btcpp_project.export(tree, options, None).texts)
+
+
+def write(folder: Path, texts: dict[str, str]) -> Path:
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def built(folder: Path, tree: Tree, **options: str) -> Path:
+    """The program ``simulate`` of a tree, compiled with all warnings as errors."""
+    require_library()
+    source = write(folder, files(tree, **options))
+    done = cmake_build(source, folder / "build", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Werror")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "build"
+
+
+def ran(program: Path, *arguments: str) -> str:
+    done = subprocess.run([program, *arguments], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def assert_succeeds_as_often(program: Path, success: Fraction, *arguments: str, runs: int = 3000) -> None:
+    """Fail if the number of successes is further from the exact one than by five standard deviations."""
+    found = re.search(r"(\d+) of (\d+) runs", ran(program, "--runs", str(runs), *arguments))
+    assert found is not None
+    deviation = float(runs * success * (1 - success)) ** 0.5
+    assert abs(int(found.group(1)) - float(runs * success)) <= 5 * deviation
+
+
+@pytest.mark.parametrize("nodes", ["stock", "bbtc"])
+@pytest.mark.parametrize("name", ["household/look-for-soda", "charging/night-round"])
+def test_the_program_of_a_domain_compiles_and_succeeds_as_often_as_simulated(
+    name: str, nodes: str, tmp_path: Path
+) -> None:
+    (problem,) = [problem for problem in PROBLEMS if str(problem) == name]
+    tree = plan_of(problem).tree
+    success = simulate_tree(tree, Limits())[0].success
+    build = built(tmp_path, tree, nodes=nodes)
+    assert_succeeds_as_often(build / "simulate", success)
+    assert_succeeds_as_often(build / "simulate", success, "--ticks", "3", "--seed", "7")
+    assert "The tree returned " in ran(build / "simulate", "--seed", "1")
+    # The stub knows nothing and can do nothing.
+    assert ran(build / "main") == "The tree returned FAILURE.\n"
+
+
+def hostile_tree() -> Tree:
+    """Predicates, actions, parameters and objects called as C++, its libraries, CMake or ROS call things
+    of their own."""
+    words = [
+        *(
+            "EOF",
+            "class",
+            "errno",
+            "NAME",
+            "PORTS",
+            "std",
+            "BT",
+            "Robot",
+            "Skipper",
+            "seen",
+            "se-en",
+            "Beliefs",
+        ),
+        *('a"); system("x', "*/", "\\", "${CMAKE}", "\n#error", "ü", "", "7", 'R"('),
+    ]
+    arguments = ("class", 'q"', "7", "ROBOT_TREE")
+    parameters = ("new", "std", "topic_name", "goal")
+    variables = tuple(
+        sorted((Variable(word, arguments, True) for word in words), key=lambda variable: variable.name)
+    )
+    known = And(tuple(Known(index) for index in range(len(words))))
+    all_true = tuple((index, Truth.TRUE) for index in range(len(words)))
+    actions = tuple(
+        sorted(
+            (
+                GroundAction(word, arguments, TRUE, (Factor((
+                    Outcome(Fraction(1, 3), (Effect(None, all_true),)),
+                    Outcome(Fraction(2, 3), (Effect(known, ((0, Truth.FALSE),)),)),
+                )),))
+                for word in words
+            ),
+            key=lambda action: action.name,
+        )
+    )  # fmt: skip
+    signatures = tuple(
+        Signature(kind, word, parameters) for kind in ("action", "predicate") for word in sorted(words)
+    )
+    task = Task(
+        'x"', "-->\n*/", variables, (InitialState(Fraction(1), (Truth.UNKNOWN,) * len(words)),),
+        Is(0, Truth.TRUE), actions, signatures=signatures,
+    )  # fmt: skip
+    attempts = tuple(
+        ControlNode(f"s{i}", "sequence", (ActionNode(f"a{i}", action.name), ConditionNode(f"c{i}", Known(0))))
+        for i, action in enumerate(actions)
+    )
+    checks: tuple[Node, ...] = tuple(
+        ConditionNode(f"k{i}", Is(i, Truth.TRUE), name='n"') for i in range(len(words))
+    )
+    root = ControlNode(
+        "r", "sequence", (ControlNode("f", "fallback", attempts), *checks), name="*/", template='t("'
+    )
+    tree = Tree(task, root, Fraction(0), Fraction(1), "stuck")
+    return replace(tree, success_probability=simulate_tree(tree, Limits())[0].success)
+
+
+@pytest.mark.parametrize("nodes", ["stock", "bbtc"])
+def test_a_program_full_of_hostile_names_compiles_and_runs(nodes: str, tmp_path: Path) -> None:
+    tree = hostile_tree()
+    assert 0 < tree.success_probability < 1
+    build = built(tmp_path, tree, nodes=nodes, namespace="class")
+    assert_succeeds_as_often(build / "simulate", tree.success_probability, runs=500)
+
+
+FIELD = re.compile(r"(?!.*__)[a-z][a-z0-9_]*[a-z0-9]|[a-z]")  # what ROS 2 takes for the name of a field
+
+
+@pytest.mark.parametrize("leaves", ["ros2-actions", "ros2-services"])
+def test_the_flavours_for_ros_are_valid_cpp(leaves: str, tmp_path: Path) -> None:
+    """Against stand-ins for the headers of ROS 2, and the headers of BehaviorTree.CPP itself."""
+    require_library()
+    folder = write(tmp_path, files(hostile_tree(), leaves=leaves, nodes="bbtc"))
+    package = re.search(r"project\((\w+)", (folder / "CMakeLists.txt").read_text())
+    assert package is not None
+    made = 0
+    for kind in ("msg", "srv", "action"):
+        for file in sorted(folder.glob(f"{kind}/*.{kind}")):
+            assert re.fullmatch(r"[A-Z][A-Za-z0-9]*", file.stem)
+            write(
+                folder,
+                {f"{package.group(1)}/{kind}/{snake(file.stem)}.hpp": interface(file, package.group(1))},
+            )
+            made += 1
+    assert made == 2 + len(hostile_tree().task.actions)
+    flags = ["-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", '-DTREE_FILE="x"']
+    flags += [f"-I{folder}", f"-I{STUBS}", *(f"-isystem{path}/include" for path in library_prefix())]
+    done = subprocess.run(
+        ["c++", *flags, "main.cpp"],
+        cwd=folder, capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def snake(name: str) -> str:
+    """The file name of an interface, by the rule of ROS 2."""
+    name = re.sub("(.)([A-Z][a-z]+)", r"\1_\2", name)
+    return re.sub("([a-z0-9])([A-Z])", r"\1_\2", name).lower()
+
+
+def interface(file: Path, package: str) -> str:
+    """The C++ that ROS 2 would make of the definition of an interface, as far as needed."""
+    types = {"string": "std::string", "uint8": "std::uint8_t", "bool": "bool"}
+    types |= {f"{name}[]": f"std::vector<{of}>" for name, of in types.items()} | {
+        "Belief[]": "std::vector<Belief>"
+    }
+    parts = [[]] if file.suffix == ".msg" else [[], []]  # type: ignore[var-annotated]
+    number = 0
+    for line in file.read_text(encoding="utf-8").splitlines():
+        if line == "---":
+            number += 1
+        elif line and not line.startswith("#"):
+            kind, name, *value = line.split(maxsplit=2)
+            if value:
+                parts[0].append(f"static constexpr {types[kind]} {name} {value[0]};")
+            else:
+                assert FIELD.fullmatch(name), name
+                parts[number].append(f"{types[kind]} {name};")
+    names = {".msg": [file.stem], ".srv": ["Request", "Response"], ".action": ["Goal", "Result"]}[file.suffix]
+    structs = [
+        f"struct {name} {{ using SharedPtr = std::shared_ptr<{name}>; {' '.join(fields)} }};"
+        for name, fields in zip(names, parts, strict=False)
+    ]
+    body = "\n".join(structs)
+    if file.suffix != ".msg":
+        body = f"struct {file.stem} {{\n{body}\n}};"
+    include = f'#include "{package}/msg/belief.hpp"\n' if "Belief[]" in file.read_text() else ""
+    return (
+        "#pragma once\n#include <cstdint>\n#include <memory>\n#include <string>\n#include <vector>\n"
+        f"{include}namespace {package}::{file.suffix[1:]} {{\n{body}\n}}\n"
+    )
+
+
+def test_the_files_are_the_same_every_time_and_leave_the_robot_alone() -> None:
+    tree = soda_tree()
+    for options in ({}, {"nodes": "bbtc"}, {"leaves": "ros2-actions"}, {"leaves": "ros2-services"}):
+        assert files(tree, **options) == files(tree, **options)
+        assert "my_robot.hpp" not in files(tree, **options)
+        assert ("bbtc_nodes.hpp" in files(tree, **options)) == ("nodes" in options)
+
+
+def test_the_command_writes_a_folder(tmp_path: Path) -> None:
+    import sys
+
+    from bbtc.artefacts import dumps, tree_to_json
+
+    (tmp_path / "tree.json").write_text(dumps(tree_to_json(soda_tree())))
+    command = [sys.executable, "-m", "bbtc.cli.main", "export", "tree.json", "--to", "btcpp_project"]
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*command, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False,
+            env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        )  # fmt: skip
+
+    assert run("-o", "made").returncode == 0
+    assert (tmp_path / "made" / "simulate.cpp").is_file()
+    assert run("-o", "made", "--check").returncode == 0
+    (tmp_path / "made" / "my_robot.hpp").write_text("mine")
+    (tmp_path / "made" / "robot.hpp").write_text("edited")
+    drifted = run("-o", "made", "--check")
+    assert drifted.returncode == 1
+    assert "BBT0008" in drifted.stderr
+    assert (tmp_path / "made" / "robot.hpp").read_text() == "edited"
+    assert run("-o", "made").returncode == 0
+    assert (tmp_path / "made" / "my_robot.hpp").read_text() == "mine"
+    assert run().returncode == 2
+    blocked = run("-o", "tree.json")
+    assert blocked.returncode == 1
+    assert "BBT0004" in blocked.stderr
+
+
+@given(st.lists(HOSTILE_NAMES | st.sampled_from(sorted(cppcode.RESERVED)), unique=True))
+def test_parameters_are_no_words_of_cpp(names: list[str]) -> None:
+    made = cppcode.parameters(names)
+    assert len(set(made)) == len(names)
+    assert not set(made) & cppcode.RESERVED
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"])))
+def test_a_literal_says_the_bytes_of_its_text(text: str) -> None:
+    made = cppcode.literal(text)
+    assert re.fullmatch(r'"(?:[ !#-\[\]-~]|\\[0-7]{3})*"', made)
+    said = re.sub(r"\\([0-7]{3})", lambda found: chr(int(found.group(1), 8)), made[1:-1])
+    assert said.encode("latin-1") == text.encode()
+
+
+@given(st.lists(st.integers(1, 10**30), min_size=1, max_size=6))
+def test_weights_are_the_probabilities_or_next_to_them(parts: list[int]) -> None:
+    probabilities = [Fraction(part, sum(parts)) for part in parts]
+    made = cppcode.weights(probabilities)
+    assert all(weight > 0 for weight in made)
+    assert sum(made) < 2**63 + 1
+    for weight, probability in zip(made, probabilities, strict=True):
+        assert abs(Fraction(weight, sum(made)) - probability) < Fraction(1, 2**49)
