@@ -102,27 +102,38 @@ def _with_templates(node: Node, rng: random.Random) -> Node:
     return replace(node, template=f"{rng.choice('st')}({','.join(args)})")
 
 
-def busy_tree(seed: int, latched: float = 1.0, starts: int = 4) -> Tree:
+def busy_tree(seed: int, starts: int = 4, endless: bool = False) -> Tree:
     """A tree that may start in up to ``starts`` states and of which several parts get their turn, with
-    at least three action nodes."""
+    at least three action nodes. Unless it may be ``endless``, all that are not latched stand below
+    retry nodes."""
     rng = random.Random(seed)
     while True:
         task = random_task(rng)
         drawn = sorted({random_initial(rng, task.variables) for _ in range(starts)})
         share = Fraction(1, len(drawn))
         task = replace(task, initial=tuple(InitialState(share, values) for values in drawn))
-        grower = _Grower(rng, task, latched, 0.3)
+        grower = _Grower(rng, task, latched=0.6, guarded=0.3)
         choices: list[tuple[ControlKind, ControlKind, Condition]] = [
             ("sequence", "fallback", TRUE),
             ("fallback", "sequence", FALSE),
         ]
         kind, inner, end = rng.choice(choices)
-        *first, last = [grower.node(3, False) for _ in range(rng.randint(2, 4))]
+        parts = [grower.part() for _ in range(rng.randint(2, 4))]
         # Whatever becomes of a part, the next one follows.
-        parts = [grower.control(inner, part, grower.check(end)) for part in first]
-        root = grower.control(kind, *parts, last)
+        parts[:-1] = [grower.control(inner, part, grower.check(end)) for part in parts[:-1]]
+        root: Node = grower.control(kind, *parts)
         if sum(1 for _ in actions_of(root)) >= 3:
+            root = root if endless else _ending(root)
             return Tree(task, root, Fraction(1, 2), Fraction(1), "stuck")
+
+
+def _ending(node: Node) -> Node:
+    """The node, with all actions latched that do not stand below a retry node."""
+    if isinstance(node, ActionNode):
+        return replace(node, latched=True)
+    if isinstance(node, ControlNode) and node.kind != "retry":
+        return replace(node, children=tuple(_ending(child) for child in node.children))
+    return node
 
 
 class _Grower:
@@ -132,6 +143,13 @@ class _Grower:
         self.latched = latched
         self.guarded = guarded
         self.ids = count(1)
+
+    def part(self) -> Node:
+        """A subtree, often below a retry node."""
+        below = self.node(3, False)
+        if self.rng.random() < 0.6:
+            return below
+        return ControlNode(f"n{next(self.ids)}", "retry", (below,), attempts=self.rng.randint(2, 4))
 
     def node(self, level: int, passive: bool) -> Node:
         """A subtree; a ``passive`` one holds no actions."""

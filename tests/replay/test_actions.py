@@ -143,6 +143,16 @@ def test_an_action_is_cancelled_where_a_precondition_fails_and_does_not_start_ag
     assert shown(ticks) == ["+go() running", "+do() -go() running", ".do() running", " failure"]
 
 
+def test_the_same_action_starts_anew_for_a_node_to_the_left(engine: Engine) -> None:
+    root = control(
+        "fallback",
+        control("sequence", check(P), ActionNode("a", "go()"), check(Q)),
+        control("sequence", ActionNode("b", "go()"), check(Q)),
+    )
+    ticks = engine(tree_of(root)).trace(script(N, Y, Y, runs=((9, True), (2, True))))
+    assert shown(ticks) == ["+go() running", "+go() -go() running", ".go() running"]
+
+
 def test_an_action_whose_condition_becomes_unknown_is_cancelled_and_nothing_goes_on(engine: Engine) -> None:
     ticks = engine(tree_of(WANTED)).trace(script(N, U, runs=((9, True),)))
     assert shown(ticks) == ["+go() running", "-go() failure"]

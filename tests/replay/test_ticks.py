@@ -22,16 +22,16 @@ TICKS = 20
 """Ticks of a script; most trees end sooner."""
 
 
-@pytest.mark.parametrize("latched", [1.0, 0.6], ids=["latched", "mixed"])
+@pytest.mark.parametrize("endless", [False, True], ids=["ending", "endless"])
 @pytest.mark.parametrize("name", ENGINES)
 def test_every_tick_is_as_in_the_reference(
-    name: EngineName, latched: float, record_property: Callable[[str, object], None]
+    name: EngineName, endless: bool, record_property: Callable[[str, object], None]
 ) -> None:
     count = dict.fromkeys(("started", "went_on", "cancelled"), 0)
     with engine(name) as (version, make):
         compared = Compared(record_property, f"actions of many ticks: reference and {version}")
         for seed in range(TREES):
-            tree, rng = busy_tree(seed, latched), random.Random(seed)
+            tree, rng = busy_tree(seed, endless=endless), random.Random(seed)
             replay = make(tree, "imported")
             for _ in range(SCRIPTS):
                 script = random_script(tree.task, rng, TICKS)
