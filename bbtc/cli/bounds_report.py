@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from fractions import Fraction
 
 from bbtc.artefacts.numbers import figure_text
 from bbtc.cli.wording import counted, exact
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
+from bbtc.kleene import Truth
 from bbtc.plan.bounds import TaskValue
-from bbtc.plan.why_not import DeadEnd
+from bbtc.plan.why_not import Block, DeadEnd
+from bbtc.source import Span
 from bbtc.tree.nodes import Tree
+
+_MOST_ENDS = 10  # dead ends told
+_MOST_BLOCKS = 3  # causes told of one of them
 
 
 def best_possible(lower: Fraction, upper: Fraction) -> str:
@@ -51,12 +57,34 @@ def bounds_lines(tree: Tree) -> list[str]:
     return [f"the best that any policy can do is {best_possible(*tree.bounds)}"]
 
 
-def dead_end_line(end: DeadEnd) -> str:
-    """One reason why a target is out of reach, with the line of the action it is due to."""
-    why = " and ".join(end.lost) or "the goal as a whole"
-    when = "from the start" if end.action is None else f"after {end.action}"
-    place = "" if end.span is None else f" [{end.span.place}]"
-    return f"  {exact(end.probability)}: {when}{place}, nothing can bring about {why}"
+def dead_end_lines(ends: Sequence[DeadEnd]) -> list[str]:
+    """Why a target is out of reach: where runs end, the most probable first, with the line of the
+    action it is due to, and what that comes from."""
+    lines = []
+    for end in ends[:_MOST_ENDS]:
+        why = " and ".join(end.lost) or "the goal as a whole"
+        when = "from the start" if end.action is None else f"after {end.action}{_at(end.span)}"
+        lines.append(f"  {exact(end.probability)}: {when}, nothing can bring about {why}")
+        lines.extend(f"    {_block(block)}" for block in end.blocks[:_MOST_BLOCKS])
+    rest = ends[_MOST_ENDS:]
+    if rest:
+        probability = exact(sum((end.probability for end in rest), Fraction(0)))
+        lines.append(f"  {probability}: {counted(len(rest), 'more way')} to end without the goal")
+    return lines
+
+
+def _block(block: Block) -> str:
+    needing = f"the goal{_at(block.span)}" if block.action is None else f"{block.action}{_at(block.span)}"
+    if block.value is Truth.UNKNOWN:
+        return f"{needing} needs {block.fact} to be unknown, and no action makes it that"
+    negation = "" if block.value is Truth.TRUE else "not "
+    if block.now is Truth.UNKNOWN:
+        return f"{needing} needs {negation}{block.fact}, which is unknown: no action observes or achieves it"
+    return f"{needing} needs {negation}{block.fact}, and no action makes that true"
+
+
+def _at(span: Span | None) -> str:
+    return "" if span is None else f" [{span.place}]"
 
 
 def bounds_json(value: TaskValue, target: Fraction) -> str:

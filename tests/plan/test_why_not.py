@@ -10,17 +10,21 @@ import sys
 import time
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from bbtc.cli.bounds_report import dead_end_lines
+from bbtc.diagnostics import Report
 from bbtc.ground.condition import Is, conjunction
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.pipeline import plan_task
+from bbtc.pipeline import compile_sources, plan_task
 from bbtc.plan import policy
-from bbtc.plan.why_not import dead_ends
+from bbtc.plan.why_not import Block, DeadEnd, dead_ends
+from bbtc.source import SourceFile
 from tests.domains.problems import REPOSITORY, bbtc
-from tests.plan.test_bounds import ONESHOT, one_shot
+from tests.plan.test_bounds import ONESHOT, coins, one_shot
 from tests.plan.test_refine import action, task
 
 T, F = Truth.TRUE, Truth.FALSE
@@ -37,6 +41,51 @@ def test_what_nothing_achieves_is_named_from_the_start() -> None:
     tree = plan_task(of, Fraction(1), "policy", Limits(), lambda _: None).tree
     (end,) = dead_ends(tree, Limits())
     assert (end.probability, end.action, end.lost) == (1, None, ("a()",))
+
+
+def test_what_is_lost_is_followed_down_to_what_no_action_brings_back(tmp_path: Path) -> None:
+    """A bulb that may burst: without light nothing is seen, and nothing mends the bulb."""
+    file = tmp_path / "bulb.pddl"
+    file.write_text(
+        """(define (domain bulb)
+          (:predicates (whole) (lit) (seen) (held))
+          (:action switch :precondition (whole)
+            :effect (probabilistic 3/4 (lit) 1/4 (not (whole))))
+          (:action look :precondition (lit)
+            :effect (probabilistic 1 (seen)))
+          (:action grasp :precondition (seen)
+            :effect (held)))
+        (define (problem dark) (:domain bulb) (:init (whole) (unknown (seen)))
+          (:goal (held)) (:goal-probability 0.9))"""
+    )
+    done = bbtc("plan", str(file), "--strategy", "policy", "-q")
+    assert done.status == 1
+    lines = [line.replace(f"{tmp_path}/", "") for line in done.err.splitlines()]
+    assert lines[2:4] == [
+        "  1/4 (0.25): after switch() [bulb.pddl:3:11], nothing can bring about held()",
+        "    switch() [bulb.pddl:3:11] needs whole(), and no action makes that true",
+    ]
+
+
+def test_many_dead_ends_are_summed_up() -> None:
+    ends = [DeadEnd(Fraction(1, 20), f"a({i})", None, ("goal()",)) for i in range(12)]
+    lines = dead_end_lines(ends)
+    assert len(lines) == 11
+    assert lines[-1] == "  1/10 (0.1): 2 more ways to end without the goal"
+
+
+def test_facts_that_nothing_tells_or_undoes_are_named_as_such() -> None:
+    blocks = (
+        Block("seen(cup)", T, Truth.UNKNOWN, "grab(cup)", None),
+        Block("broken()", F, T, None, None),
+        Block("seen(cup)", Truth.UNKNOWN, F, "look()", None),
+    )
+    assert dead_end_lines([DeadEnd(Fraction(1), None, None, (), blocks)]) == [
+        "  1: from the start, nothing can bring about the goal as a whole",
+        "    grab(cup) needs seen(cup), which is unknown: no action observes or achieves it",
+        "    the goal needs not broken(), and no action makes that true",
+        "    look() needs seen(cup) to be unknown, and no action makes it that",
+    ]
 
 
 def test_a_target_that_is_reached_has_no_dead_ends_to_explain() -> None:
@@ -58,7 +107,7 @@ def test_an_interrupt_leaves_the_best_tree_so_far(monkeypatch: pytest.MonkeyPatc
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(policy, "with_least_attempts", interrupted)
+    monkeypatch.setattr(policy, "finished", interrupted)
     again = action("again", Is(0, F), ("1/2", {0: T}), ("1/2", {}))
     of = task("a", {}, Is(0, T), again)
     tree = plan_task(of, Fraction("0.9"), "policy", Limits(), lambda _: None).tree
@@ -66,6 +115,30 @@ def test_an_interrupt_leaves_the_best_tree_so_far(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(policy, "synthesize", interrupted)
     tree = plan_task(of, Fraction("0.9"), "policy", Limits(), lambda _: None).tree
     assert (tree.status, tree.success_probability) == ("interrupted", 0)
+
+
+@pytest.mark.parametrize("after", [1, 2, 3])
+def test_an_interrupted_search_leaves_what_it_knows(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
+    from bbtc.plan.heuristic_search import _Search
+
+    count = 0
+    plunge = _Search._plunge
+
+    def interrupted(*arguments: Any) -> None:
+        nonlocal count
+        count += 1
+        if count == after:
+            raise KeyboardInterrupt
+        plunge(*arguments)
+
+    monkeypatch.setattr(_Search, "_plunge", interrupted)
+    of = compile_sources([SourceFile("coins.pddl", coins(9))], Report(), Limits())
+    tree = plan_task(of, Fraction(1, 2), "policy", Limits(states=2000), lambda _: None).tree
+    assert tree.status == "interrupted"
+    assert tree.bounds is not None
+    assert tree.success_probability == tree.bounds[0]
+    assert tree.bounds[0] <= Fraction(3, 4) ** 9 < tree.bounds[1]
+    assert (tree.success_probability > 0) == (after > 1)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as on POSIX")
