@@ -1,10 +1,9 @@
 """Grounds one pair in a process of its own, for :mod:`tests.benchmarks.grounding`; prints JSON.
 
 Arguments: ``instantiate`` (everything reachable) or ``ground`` (what matters to the goal, too), domain,
-problem. Time counts from the resolved model to the finished task; memory is the peak of this process and
-that of the engine's, if it ran apart, added up although they hardly coincide. The engine's is looked up
-while it runs: what the system tells of ended processes counts the image they were started from, too,
-which is a copy of this one.
+problem. Time counts from the resolved model to the finished task. Memory is what this process and the
+engine's, if it runs apart, take together at one time, at most; it is looked up every few milliseconds
+(what the system tells of ended processes counts the image they were started from, too, a copy of this one).
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ import resource
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError, Report
@@ -29,30 +29,41 @@ def _processor_seconds() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-class _Engine(threading.Thread):
-    """Follows the peak of memory of this process's children."""
+class _Memory(threading.Thread):
+    """Follows the memory of this process and its children, all together."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
-        self.kilobytes = 0
+        self.most = 0
+        self.most_of_engine = 0
 
     def run(self) -> None:
         """Look every few milliseconds."""
         while True:
-            for child in Path("/proc/self/task").glob("*/children"):
-                try:
-                    for process in child.read_text().split():
-                        self._look(Path("/proc", process))
-                except (OSError, ValueError):
-                    continue
+            engine = sum(map(self._kilobytes, self._children()))
+            self.most_of_engine = max(self.most_of_engine, engine)
+            if engine:
+                self.most = max(self.most, engine + self._kilobytes(Path("/proc/self")))
             time.sleep(0.005)
 
-    def _look(self, process: Path) -> None:
-        if (process / "cmdline").read_bytes() == Path("/proc/self/cmdline").read_bytes():
-            return  # not started yet
-        for line in (process / "status").read_text().splitlines():
-            if line.startswith("VmHWM"):
-                self.kilobytes = max(self.kilobytes, int(line.split()[1]))
+    @staticmethod
+    def _children() -> list[Path]:
+        found = []
+        for listed in Path("/proc/self/task").glob("*/children"):
+            with suppress(OSError):
+                found += [Path("/proc", number) for number in listed.read_text().split()]
+        return found
+
+    @staticmethod
+    def _kilobytes(process: Path) -> int:
+        with suppress(OSError, ValueError):
+            # A child that still runs our command has not started its own: it shares our memory.
+            ours = Path("/proc/self/cmdline").read_bytes()
+            if process.name == "self" or (process / "cmdline").read_bytes() != ours:
+                for line in (process / "status").read_text().splitlines():
+                    if line.startswith("VmRSS"):
+                        return int(line.split()[1])
+        return 0
 
 
 def main() -> None:
@@ -65,8 +76,8 @@ def main() -> None:
         report.raise_errors()
         assert inputs is not None
         model = resolve_model(inputs, report, checks=False)
-        engine = _Engine()
-        engine.start()
+        memory = _Memory()
+        memory.start()
         start, used = time.perf_counter(), _processor_seconds()
         task = (ground if how == "ground" else instantiate)(model, report, Limits())
         end, used = time.perf_counter(), _processor_seconds() - used
@@ -82,7 +93,8 @@ def main() -> None:
                 "seconds": end - start,
                 "processor": used,
                 "before": start - began,
-                "kilobytes": own + engine.kilobytes,
+                "kilobytes": max(own, memory.most),
+                "engine": memory.most_of_engine,
                 "own": own,
             }
         )

@@ -2,8 +2,8 @@
 
 The largest task of the corpus, one of many outcomes, and every pair of two probabilistic competitions,
 each in a process of its own, from the resolved model to the pruned task. What reading and resolving take
-stands in a column of its own; it includes loading the grammar. Memory is that of bbtc plus the peak of
-its engine, which hardly coincide. Exits with 1 where a bound on wall-clock time or memory is exceeded.
+stands in a column of its own; it includes loading the grammar. Memory is what bbtc and its engine take
+together at one time, at most. Exits with 1 where a bound on wall-clock time or memory is exceeded.
 """
 
 from __future__ import annotations
