@@ -30,10 +30,7 @@ def do_all(jobs: Sequence[Job], at_once: int) -> Iterator[Made]:
     this process. A process that dies costs its job, no other. Raises ``KeyboardInterrupt``."""
     at_once = min(at_once, len(jobs))
     if at_once <= 1:
-        for job in jobs:
-            with _interrupted_at_once():
-                made = perform(job)
-            yield made
+        yield from map(_perform_here, jobs)
         return
     waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
     ready: queue.SimpleQueue[Made | BaseException] = queue.SimpleQueue()
@@ -51,6 +48,11 @@ def do_all(jobs: Sequence[Job], at_once: int) -> Iterator[Made]:
     finally:
         for worker in workers:
             worker.end()
+
+
+def _perform_here(job: Job) -> Made:
+    with _interrupted_at_once():
+        return perform(job)
 
 
 class _Interrupted(BaseException):

@@ -211,18 +211,11 @@ class _Builder:
         if TREE not in stale:
             with contextlib.suppress(OSError):
                 tree = self.contents.read(entry.file)
-        sources = []
-        for path in entry.inputs if tree is None else ():
-            shown = source_name(self.folder, path)
-            try:
-                sources.append((shown, self.contents.read(path)))
-            except (OSError, ValueError) as error:
-                reason = getattr(error, "strerror", None) or str(error)
-                raise BbtcError.single("BBT0001", f"cannot read {shown}: {reason}", entry.span) from error
+        sources = _sources(self.contents, entry) if tree is None else ()
         every = tree is None  # a new tree makes everything anew
         exports = tuple(e for e in entry.exports if every or export_step(e.name) in stale)
         figures = bool(entry.expect) and (every or FIGURES in stale)
-        return Job(_without_places(entry), tuple(sources), tree, figures, exports)
+        return Job(_without_places(entry), sources, tree, figures, exports)
 
     # --- what was made -----------------------------------------------------------------------
 
@@ -230,7 +223,7 @@ class _Builder:
         """Write what was made, take note of it, and tell what became of the tree."""
         from bbtc.build.job import TREE
 
-        diagnostics = [*made.diagnostics, *_complaints(entry, made)]
+        diagnostics = [*made.diagnostics, *complaints(entry, made)]
         if made.failure is not None:
             return Outcome(entry.name, "failed", (), tuple(diagnostics), made.failure)
         changed: list[str] = []
@@ -268,6 +261,40 @@ class _Builder:
         self.saved = time.monotonic()
 
 
+def sources_of(manifest: Path) -> list[Path]:
+    """The files that a build depends on: the manifest, and, if it can be read, the inputs of its trees."""
+    from bbtc.manifest.read import read_manifest
+
+    file = manifest.absolute()
+    files = {file}
+    with contextlib.suppress(BbtcError):
+        for entry in read_manifest(file, manifest_bytes(file)).trees:
+            files.update(file.parent / path for path in entry.inputs)
+    return sorted(files)
+
+
+def make_tree(manifest: Manifest, entry: TreeEntry) -> Made:
+    """Plan a tree and look at its figures, without exports and without looking at what was built before.
+    Raises :class:`BbtcError` for an input that cannot be read."""
+    from bbtc.build.job import Job, perform
+
+    sources = _sources(Contents(manifest.folder), entry)
+    return perform(Job(_without_places(entry), sources, None, bool(entry.expect), ()))
+
+
+def _sources(contents: Contents, entry: TreeEntry) -> tuple[tuple[str, bytes], ...]:
+    """The inputs of a tree, with the names that messages give them. Raises :class:`BbtcError`."""
+    sources = []
+    for path in entry.inputs:
+        shown = source_name(contents.folder, path)
+        try:
+            sources.append((shown, contents.read(path)))
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise BbtcError.single("BBT0001", f"cannot read {shown}: {reason}", entry.span) from error
+    return tuple(sources)
+
+
 def _chosen(manifest: Manifest, names: Sequence[str]) -> Iterable[TreeEntry]:
     """The entries of these names, or all. Raises :class:`BbtcError` for a name that there is not."""
     from bbtc.artefacts.cursor import clip, nearest
@@ -290,7 +317,7 @@ def _without_places(entry: TreeEntry) -> TreeEntry:
     )
 
 
-def _complaints(entry: TreeEntry, made: Made) -> Iterator[Diagnostic]:
+def complaints(entry: TreeEntry, made: Made) -> Iterator[Diagnostic]:
     """What the manifest asks for and the tree does not give, with the places in the manifest."""
     if made.short is not None:
         hint = f"`bbtc plan {' '.join(entry.inputs)}` shows how far it gets, and why no further"

@@ -130,11 +130,9 @@ def _progress(session: Session) -> Iterator[Tell | None]:
 
 def _wait_for_change(manifest: Path) -> None:
     """Return when the manifest or an input of the last build has changed, and has come to rest."""
-    from bbtc.build.state import load_state
+    from bbtc.build.runner import sources_of
 
-    folder = manifest.absolute().parent
-    steps = [step for tree in load_state(folder).trees.values() for step in tree.values()]
-    files = sorted({manifest.absolute(), *(folder / path for step in steps for path in step.inputs)})
+    files = sources_of(manifest)
 
     def stamps() -> list[tuple[int, int] | None]:
         found: list[tuple[int, int] | None] = []

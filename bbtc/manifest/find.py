@@ -20,7 +20,7 @@ def find_manifest(start: Path) -> Path:
     one around it that has one. Raises :class:`BbtcError` where there is none, or two."""
     start = start.absolute()
     for folder in [start, *start.parents]:
-        found = [file for file in (folder / YAML_NAME, folder / TOML_NAME) if _is_manifest(file)]
+        found = [file for file in (folder / YAML_NAME, folder / TOML_NAME) if is_manifest(file)]
         if len(found) > 1:
             raise BbtcError.single(
                 "BBT1002",
@@ -36,7 +36,8 @@ def find_manifest(start: Path) -> Path:
     )
 
 
-def _is_manifest(file: Path) -> bool:
+def is_manifest(file: Path) -> bool:
+    """Is this file, which has a name of one, a manifest?"""
     if not file.is_file():
         return False
     if file.name != TOML_NAME:

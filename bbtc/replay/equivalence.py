@@ -1,0 +1,48 @@
+"""Does an exported tree do, run by run, what the exact simulation says?"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from itertools import islice
+from types import MappingProxyType
+
+from bbtc.belief.chain import explore
+from bbtc.belief.scenarios import scenarios
+from bbtc.limits import Limits
+from bbtc.replay.script import TIMINGS, run_of, script_of
+from bbtc.tree.nodes import Tree
+
+ENGINES = MappingProxyType({"py_trees": "py_trees", "btcpp": "behaviortreepy"})
+"""The formats whose engines run here, and the modules that bring these along."""
+
+
+def engine_missing(form: str) -> str | None:
+    """The module that is missing to run a format; None if it is there."""
+    module = ENGINES[form]
+    return None if find_spec(module) is not None else module
+
+
+def difference(tree: Tree, form: str, limits: Limits, most: int = 200) -> str | None:
+    """How an export behaves differently from the simulation, in words; None if it does not.
+
+    Replays the ``most`` most probable runs, each with outcomes that land between ticks, during a tick, and
+    within the one that starts the action. Raises ``LimitReached``.
+    """
+    from bbtc.replay.engines import BtcppReplay, PyTreesReplay
+
+    chain = explore(tree.task, tree.root, limits)
+    replay = PyTreesReplay(tree) if form == "py_trees" else BtcppReplay(tree)
+    for number, scenario in enumerate(islice(scenarios(chain), most), 1):
+        expected, script = run_of(scenario), script_of(scenario)
+        for timing in TIMINGS:
+            found = replay.run(script, timing)
+            if found != expected:
+                return (
+                    f"run {number} (outcomes land {timing}): expected {_words(expected.actions)}, "
+                    f"{expected.status}; {form} did {_words(found.actions)}, {found.status}"
+                )
+    return None
+
+
+def _words(actions: tuple[str, ...]) -> str:
+    return ", ".join(actions) or "nothing"
