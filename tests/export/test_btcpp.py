@@ -53,7 +53,10 @@ def check_form(text: str) -> ET.Element:
     model = root[-1]
     entries = {entry.attrib["ID"]: entry for entry in model}
     assert len(entries) == len(model)
-    ids = [*trees_by_id, *(name for name, entry in entries.items() if entry.tag != "SubTree")]
+    ids = [
+        *trees_by_id,
+        *(name for name, entry in entries.items() if entry.tag not in ("SubTree", "Control")),
+    ]
     assert len({name.casefold() for name in ids}) == len(ids)
     assert not {name.casefold() for name in ids} & {name.casefold() for name in RESERVED}
     for name in ids:
@@ -76,6 +79,9 @@ def check_nodes(tree: ET.Element, entries: dict[str, ET.Element], tree_ids: set[
             model = entries.get(node.attrib["ID"])
             assert own == ({port.attrib["name"] for port in model} if model is not None else set())
             assert not any(re.match(r"[0-9.+-]", node.attrib[port]) for port in own)
+        elif node.tag in ("Skipper", "Latch"):
+            assert own <= {port.attrib["name"] for port in entries[node.tag].iter("input_port")}
+            assert len(node) >= 1
         elif node.tag in entries:
             assert own == {port.attrib["name"] for port in entries[node.tag].iter("input_port")}
             assert len(node) == 0
@@ -97,9 +103,101 @@ def depth(element: ET.Element) -> int:
 
 
 def test_the_soda_tree(golden: Golden) -> None:
-    text = export(soda_tree())
+    for options, file in (
+        ({}, "soda.xml"),
+        ({"nodes": "bbtc", "namespace": "kitchen"}, "soda-nodes.xml"),
+    ):
+        text = export(soda_tree(), **options)
+        check_form(text)
+        golden(f"export/{file}", text)
+
+
+def test_the_palette_has_the_leaves_and_control_nodes_alone(golden: Golden) -> None:
+    text = palette(soda_tree(), nodes="bbtc")
+    golden("export/soda-palette.xml", text)
+    (model,) = ET.fromstring(text)
+    assert [entry.tag for entry in model] == ["Condition"] * 2 + ["Action"] * 2 + ["Control"] * 2
+    assert [entry.tag for entry in ET.fromstring(palette(soda_tree()))[0]] == ["Condition"] * 2 + [
+        "Action"
+    ] * 2
+
+
+def palette(tree: Tree, **options: str) -> str:
+    exporter = load_exporter("btcpp_palette")
+    text = exporter.export(tree, parse_options(exporter, options), None)
+    assert isinstance(text, str)
+    return text
+
+
+def templated(*templates: str) -> Tree:
+    """A sequence of expansions ``look(x)``: go to x, and see."""
+    variables = tuple(Variable("seen", (name,), True) for name in ("a", "b"))
+    actions = tuple(GroundAction("go", (name,), TRUE, ()) for name in ("a", "b"))
+    steps = tuple(
+        ControlNode(
+            f"s{i}",
+            "sequence",
+            (
+                ActionNode(f"g{i}", f"go({template[-2]})"),
+                ConditionNode(f"c{i}", Known("ab".index(template[-2]))),
+            ),
+            template=template,
+        )
+        for i, template in enumerate(templates)
+    )
+    return tree_of(ControlNode("r", "sequence", steps), *variables, actions=actions)
+
+
+def trees_called(text: str, name: str) -> list[str]:
+    return [
+        tree.attrib["ID"] for tree in ET.fromstring(text).iter("BehaviorTree") if name in tree.attrib["ID"]
+    ]
+
+
+@pytest.mark.parametrize("nodes", ["stock", "bbtc"])
+def test_expansions_of_a_template_share_a_tree_with_its_arguments_as_ports(nodes: str) -> None:
+    text = export(templated("look(a)", "look(b)", "look(a)"), nodes=nodes)
     check_form(text)
-    golden("export/soda.xml", text)
+    assert trees_called(text, "Look") == ["Look"]
+    main = ET.fromstring(text)[0]
+    calls = [call.attrib for call in main.iter("SubTree") if call.attrib["ID"] == "Look"]
+    assert [(call["name"], call["arg"]) for call in calls] == [
+        ("look(a)", "a"),
+        ("look(b)", "b"),
+        ("look(a) #2", "a"),
+    ]
+
+
+def test_expansions_that_differ_in_more_than_arguments_have_trees_of_their_own() -> None:
+    # The second does not say that it is about b: its leaves have b for themselves.
+    text = export(templated("look(a)", "look(?b)"))
+    check_form(text)
+    assert len(trees_called(text, "Look")) == 2
+
+
+def test_a_namespace_comes_before_every_id_and_entry() -> None:
+    text = export(soda_tree(), namespace="my-kitchen")
+    root = check_form(text)
+    named = [tree.attrib["ID"] for tree in root.iter("BehaviorTree")]
+    named += [entry.attrib["ID"] for entry in root[-1]] if root[-1].tag == "TreeNodesModel" else []
+    assert all(name.startswith("MyKitchen") for name in named)
+    assert set(re.findall(r"@\w+", text)) == {"@my_kitchen_acting"}
+
+
+@pytest.mark.parametrize("namespace", ["a b", "1a", "-", "ä", "a.b", "x" * 41, 'a"'])
+def test_a_namespace_that_is_no_name_is_refused(namespace: str) -> None:
+    with pytest.raises(BbtcError) as error:
+        export(soda_tree(), namespace=namespace)
+    assert error.value.diagnostics[0].code == "BBT0704"
+
+
+def test_a_namespace_never_makes_an_id_of_the_engine() -> None:
+    # Parallel + All, Re + active…: the whole would be a node of the engine.
+    actions = tuple(GroundAction(name, (), TRUE, ()) for name in ("all", "sequence"))
+    steps = tuple(ActionNode(f"n{i}", action.name) for i, action in enumerate(actions))
+    tree = tree_of(ControlNode("r", "sequence", steps), actions=actions)
+    for namespace in ("Parallel", "Reactive", "reactive"):
+        check_form(export(tree, namespace=namespace))
 
 
 def test_the_model_can_be_left_out() -> None:
@@ -116,6 +214,7 @@ def test_random_trees_keep_the_rules_of_the_engine(seed: int) -> None:
     tree = random_tree(seed, latched=0.7)
     text = export(tree)
     check_form(text)
+    check_form(export(tree, nodes="bbtc"))
     assert export(tree) == text
 
 
@@ -124,6 +223,8 @@ def test_random_trees_keep_the_rules_of_the_engine(seed: int) -> None:
 def test_hostile_names_neither_break_the_file_nor_change_what_it_does(tree: Tree) -> None:
     pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
     check_form(export(tree))
+    check_form(export(tree, nodes="bbtc", namespace="class"))
+    assert ET.fromstring(palette(tree, nodes="bbtc"))[0].tag == "TreeNodesModel"
     replay = BtcppReplay(tree)
     rng = random.Random(1)
     for _ in range(3):
