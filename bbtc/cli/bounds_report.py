@@ -47,6 +47,8 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
     lines.append(f"{counted(value.states, 'state')}{some}, {counted(value.choices, 'choice')}")
     if value.stop is not None:
         lines.append(value.stop.message)
+    if value.interrupted:
+        lines.append("interrupted")
     return "".join(f"{line}\n" for line in lines)
 
 

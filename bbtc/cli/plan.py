@@ -114,12 +114,15 @@ def _print_bounds(
     from bbtc.cli.bounds_report import bounds_json, bounds_report
     from bbtc.plan.bounds import task_value
 
-    value = task_value(task, session.limits, options, costs=True)
+    with _terminated_like_interrupted():
+        value = task_value(task, session.limits, options, costs=True)
     session.clear()
     text = bounds_json(value, target) if as_json else bounds_report(task, value, target)
     write(output, text)
     if value.lower >= target:
         return 0
+    if value.interrupted:
+        return EXIT_INTERRUPTED
     return EXIT_ERRORS if value.upper < target else EXIT_LIMIT
 
 

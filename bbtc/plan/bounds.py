@@ -11,6 +11,7 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.result import Plan
+from bbtc.tree.nodes import Status
 
 if TYPE_CHECKING:
     from bbtc.plan.space import StateSpace
@@ -23,7 +24,7 @@ class TaskValue:
     the best probability with at most so many actions. ``cost`` is the least expected cost of a
     policy that attains P*, exact if ``cost_exact``; None where it was not computed. Of ``states``
     found, ``expanded`` had their ``choices`` looked at: all of them, or those that matter. ``stop``
-    says which limit left the bounds apart, if one did."""
+    says which limit left the bounds apart, if one did; ``interrupted`` tells that the user did."""
 
     lower: Fraction
     upper: Fraction
@@ -34,6 +35,7 @@ class TaskValue:
     cost: Fraction | None = None
     cost_exact: bool = False
     stop: Diagnostic | None = None
+    interrupted: bool = False
 
 
 def task_value(
@@ -77,6 +79,7 @@ def _without_end(task: Task, limits: Limits, *, costs: bool, target: Fraction | 
         cost=None if cost is None else cost.initial,
         cost_exact=cost is not None and cost.exact,
         stop=stop,
+        interrupted=best.interrupted,
     )
 
 
@@ -88,6 +91,7 @@ def _value(
     cost: Fraction | None = None,
     cost_exact: bool = False,
     stop: Diagnostic | None,
+    interrupted: bool = False,
 ) -> TaskValue:
     return TaskValue(
         lower=bounds.lower,
@@ -99,6 +103,7 @@ def _value(
         cost=cost,
         cost_exact=cost_exact,
         stop=stop,
+        interrupted=interrupted,
     )
 
 
@@ -108,13 +113,15 @@ def judged(plan: Plan, limits: Limits, options: Options = DEFAULTS) -> Plan:
     tree = plan.tree
     if tree.status not in {"stuck", "limit-reached"} or tree.bounds is not None:
         return plan
-    lower, upper = tree.success_probability, Fraction(1)
+    lower, upper, interrupted = tree.success_probability, Fraction(1), False
     try:
         value = task_value(tree.task, limits, options, target=tree.target)
-        lower, upper = max(lower, value.lower), value.upper
+        lower, upper, interrupted = max(lower, value.lower), value.upper, value.interrupted
     except (LimitReached, MemoryError):
         pass
     except KeyboardInterrupt:
         return replace(plan, tree=replace(tree, status="interrupted"))
-    status = "out-of-reach" if upper < tree.target else tree.status
+    status: Status = "out-of-reach" if upper < tree.target else tree.status
+    if interrupted:
+        status = "interrupted"
     return replace(plan, tree=replace(tree, status=status, bounds=(lower, upper)))

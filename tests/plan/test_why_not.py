@@ -118,7 +118,9 @@ def test_an_interrupt_leaves_the_best_tree_so_far(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("after", [1, 2, 3])
-def test_an_interrupted_search_leaves_what_it_knows(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
+def test_an_interrupted_search_leaves_what_it_knows(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
+) -> None:
     from bbtc.plan.heuristic_search import _Search
 
     count = 0
@@ -139,6 +141,15 @@ def test_an_interrupted_search_leaves_what_it_knows(monkeypatch: pytest.MonkeyPa
     assert tree.success_probability == tree.bounds[0]
     assert tree.bounds[0] <= Fraction(3, 4) ** 9 < tree.bounds[1]
     assert (tree.success_probability > 0) == (after > 1)
+    count = 0
+    tree = plan_task(of, Fraction(1, 2), "refine", Limits(states=2000), lambda _: None).tree
+    assert tree.status == "interrupted", "bounds are searched for where refinement got stuck"
+    count = 0
+    file = tmp_path / "coins.pddl"
+    file.write_text(coins(9))
+    done = bbtc("plan", str(file), "--bounds", "--max-states", "2000", "--target", "1/2")
+    assert done.status == 130
+    assert done.out.decode().splitlines()[-1] == "interrupted"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as on POSIX")
