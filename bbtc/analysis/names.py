@@ -92,9 +92,9 @@ class Names:
         if (self.section, kind, key) in self._told:
             return
         self._told.add((self.section, kind, key))
-        near = self._slip(kind, key, known)
-        if near is None and self._compares(known):
-            near = nearest(key, known)
+        near = None
+        if self._compares(known):
+            near = slip(key, known) or nearest(key, known)
         hint: str | None = None
         related: list[Related] = []
         if near is not None:
