@@ -101,7 +101,7 @@ class _Search:
     task: Task
     target: Fraction
     limits: Limits
-    moves: Moves
+    moves: Moves = field(init=False)
     transitions: dict[str, Transition] = field(default_factory=dict)
     trees: int = 0
     states: int = 0
@@ -113,6 +113,7 @@ class _Search:
 
     def run(self) -> None:
         """Search until the target is reached, nothing is left, or enough was tried."""
+        self.moves = Moves(self.task)
         self.push(_Open(None, None, 0, ()), Fraction(1))
         while self.heap and self.trees < MOST_TREES and self.states < MOST_STATES:
             shortfall, discrepancy, depth, _, entry = heapq.heappop(self.heap)
@@ -321,7 +322,7 @@ def plan_search(
     start = freeze(Draft.start(task)).root
     initial = simulate(task, start, limits)
     limits.check_nodes(size(start))
-    search = _Search(task, target, limits, Moves(task))
+    search = _Search(task, target, limits)
     status: PlanStatus = "stuck"
     stop: Diagnostic | None = None
     root: Node = start

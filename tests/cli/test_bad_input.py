@@ -227,7 +227,8 @@ def test_wrong_usage_is_status_2(folder: Path, arguments: list[str]) -> None:
 
 
 def test_a_limit_is_status_3_and_writes_the_best_tree(folder: Path) -> None:
-    done = bbtc("plan", "domain.pddl", "problem.pddl", "--max-nodes", "26", "-o", "out.json", folder=folder)
+    limited = ["--strategy", "refine", "--max-nodes", "26", "-o", "out.json"]
+    done = bbtc("plan", "domain.pddl", "problem.pddl", *limited, folder=folder)
     assert done.returncode == 3, done.stderr
     tree = json.loads((folder / "out.json").read_text())
     assert (tree["status"], tree["success_probability"]) == ("limit-reached", "7/8")
@@ -245,7 +246,7 @@ def test_check_writes_nothing_and_fails_on_drift(folder: Path) -> None:
 
 
 def test_input_from_stdin_and_output_to_stdout(folder: Path) -> None:
-    done = bbtc("plan", "-", folder=folder, stdin=DOMAIN + PROBLEM)
+    done = bbtc("plan", "-", "--strategy", "refine", folder=folder, stdin=DOMAIN + PROBLEM)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["success_probability"] == "31/32"
 
