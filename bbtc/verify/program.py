@@ -8,7 +8,7 @@ the update. Source: Kwiatkowska, Norman, Parker, "PRISM 4.0" (2011), reactive mo
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, TypeAlias
@@ -69,38 +69,46 @@ YES, NO = Literally(True), Literally(False)
 
 
 def all_of(*parts: Expression) -> Expression:
-    """Conjunction, flattened, without constants, repeats and plain contradictions."""
-    kept: dict[Expression, None] = {}
-    for part in parts:
-        if part == NO:
-            return NO
-        if part != YES:
-            kept.update(dict.fromkeys(part.parts if isinstance(part, AllOf) else [part]))
-    if any(isinstance(part, Negation) and part.part in kept for part in kept):
+    """Conjunction, flattened, without constants, and without atoms that repeat or contradict others."""
+    kept = _distinct(inner for part in parts for inner in (part.parts if isinstance(part, AllOf) else [part]))
+    atoms = {part for part in kept if is_atom(part)}
+    if NO in atoms or any(isinstance(part, Negation) and part.part in atoms for part in atoms):
         return NO
-    return AllOf(tuple(kept)) if len(kept) > 1 else next(iter(kept), YES)
+    left = tuple(part for part in kept if part != YES)
+    return AllOf(left) if len(left) > 1 else left[0] if left else YES
 
 
 def any_of(*parts: Expression) -> Expression:
-    """Disjunction, flattened, without constants, repeats and plain tautologies."""
-    kept: dict[Expression, None] = {}
-    for part in parts:
-        if part == YES:
-            return YES
-        if part != NO:
-            kept.update(dict.fromkeys(part.parts if isinstance(part, AnyOf) else [part]))
-    if any(isinstance(part, Negation) and part.part in kept for part in kept):
+    """Disjunction, flattened, without constants, and without atoms that repeat or, next to others, say
+    nothing."""
+    kept = _distinct(inner for part in parts for inner in (part.parts if isinstance(part, AnyOf) else [part]))
+    atoms = {part for part in kept if is_atom(part)}
+    if YES in atoms or any(isinstance(part, Negation) and part.part in atoms for part in atoms):
         return YES
-    if any(isinstance(part, AllOf) and any(none_of(p) in kept for p in part.parts) for part in kept):
-        return any_of(*(_besides(part, kept) for part in kept))
-    return AnyOf(tuple(kept)) if len(kept) > 1 else next(iter(kept), NO)
+    reduced = [_besides(part, atoms) if isinstance(part, AllOf) else part for part in kept]
+    if any(one is not other for one, other in zip(reduced, kept, strict=True)):
+        return any_of(*reduced)
+    left = tuple(part for part in kept if part != NO)
+    return AnyOf(left) if len(left) > 1 else left[0] if left else NO
 
 
-def _besides(part: Expression, others: Iterable[Expression]) -> Expression:
-    """What the part adds to a disjunction with others: without conditions that one of them negates."""
-    if not isinstance(part, AllOf):
-        return part
-    return all_of(*(inner for inner in part.parts if none_of(inner) not in others))
+def _distinct(parts: Iterable[Expression]) -> list[Expression]:
+    """The parts without atoms that repeat. (To compare larger ones would cost more than it gains.)"""
+    seen: set[Expression] = set()
+    found = []
+    for part in parts:
+        if not is_atom(part):
+            found.append(part)
+        elif part not in seen:
+            seen.add(part)
+            found.append(part)
+    return found
+
+
+def _besides(part: AllOf, others: Collection[Expression]) -> Expression:
+    """What the part adds to a disjunction with others: without atoms that one of them negates."""
+    kept = [inner for inner in part.parts if not is_atom(inner) or none_of(inner) not in others]
+    return part if len(kept) == len(part.parts) else all_of(*kept)
 
 
 def none_of(*parts: Expression) -> Expression:
