@@ -289,8 +289,11 @@ def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
 
 
 def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limits) -> Artefact:
-    """The tree in an export format. Raises :class:`BbtcError` for an unknown format or option and
-    for a tree the format cannot hold."""
+    """The tree in an export format, the same whether it was just planned or read from a file. Raises
+    :class:`BbtcError` for an unknown format or option and for a tree the format cannot hold."""
+    from bbtc.artefacts.tree_json import carried
+
+    tree = carried(tree)
     exporter = load_exporter(form)
     parsed = parse_options(exporter, options)
     reached = None

@@ -51,10 +51,16 @@ _BOUNDS = ("lower", "upper")
 # --- out -------------------------------------------------------------------------------------
 
 
+def carried(tree: Tree) -> Tree:
+    """The tree with as much of its task as it carries along."""
+    used = {node.action for node in actions_of(tree.root)}
+    actions = tuple(action for action in tree.task.actions if action.name in used)
+    return replace(tree, task=replace(tree.task, actions=actions, templates=()))
+
+
 def tree_to_json(tree: Tree) -> Json:
     """The tree as a JSON object."""
-    used = {node.action for node in actions_of(tree.root)}
-    task = replace(tree.task, actions=tuple(a for a in tree.task.actions if a.name in used), templates=())
+    task = carried(tree).task
     value: Json = {
         "format": FORMAT,
         "version": VERSION,
