@@ -111,11 +111,11 @@ def plan(
 ) -> Plan:
     """Plan a tree that reaches the goal with the target probability (default: the problem's own).
 
-    ``strategy`` is ``refine`` (the default), ``policy`` or ``auto``; ``max_actions`` bounds the actions of
-    every run; ``progress`` is told each refinement as it is made. The plan's ``tree.status`` says
-    whether the target was reached; falling short of it raises nothing. Raises :class:`BbtcError` for
-    input that is wrong and an unknown strategy, :class:`LimitReached` where the limits allow no
-    tree at all, and ``ValueError`` for a target that is no probability.
+    ``strategy`` is ``advised`` (the default), ``auto``, ``search``, ``policy`` or ``refine``;
+    ``max_actions`` bounds the actions of every run; ``progress`` is told each refinement as it is made.
+    The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
+    Raises :class:`BbtcError` for input that is wrong and an unknown strategy, :class:`LimitReached` where the
+    limits allow no tree at all, and ``ValueError`` for a target that is no probability.
     """
     from bbtc import pipeline
     from bbtc.plan.options import Options

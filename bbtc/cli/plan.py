@@ -47,7 +47,7 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option(
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
-@click.option("--strategy", default=DEFAULT, show_default=True, help="refine, search, policy or auto.")
+@click.option("--strategy", default=DEFAULT, show_default=True, help="Or auto, search, policy, refine.")
 @click.option("--max-actions", type=click.IntRange(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",

@@ -1,4 +1,6 @@
-"""The strategy ``auto``: the smallest tree found that reaches the target and, among those, the cheapest;
+"""The strategies that choose among others.
+
+``auto``: the smallest tree found that reaches the target and, among those, the cheapest;
 where none does, the one with the greatest success probability.
 
 1. Search over refinements: it takes time with the size of the tree, not of the task.
@@ -7,6 +9,9 @@ where none does, the one with the greatest success probability.
    be reached.
 3. Refine greedily, as published, in as many nodes as would make a smaller tree than those found; of
    a task with many actions, again, only where the target was not reached.
+
+``advised``, the default: templates are their author's advice on how things are done, and only refinement
+follows it. Where a task has templates, and refinement reaches the target, its tree is taken; else ``auto``.
 """
 
 from __future__ import annotations
@@ -54,6 +59,20 @@ def plan_auto(
     for step in kept.refinements:
         progress(step)
     return _with_findings(kept, plans)
+
+
+def plan_advised(
+    task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = DEFAULTS
+) -> Plan:
+    """Plan by refinement where the task has templates, else, and where that falls short of the target, by
+    :func:`plan_auto`, and as that does."""
+    if task.templates and len(task.actions) <= MANY_ACTIONS and options == DEFAULTS:
+        plan = refine(task, target, replace(limits, states=min(limits.states, _REFINE_STATES)), _silent)
+        if plan.tree.status in {"target-reached", "interrupted"}:
+            for step in plan.refinements:
+                progress(step)
+            return plan
+    return plan_auto(task, target, limits, progress, options)
 
 
 def _silent(step: Refinement) -> None:

@@ -16,10 +16,11 @@ STRATEGIES = {
     "search": ("bbtc.plan.search", "plan_search"),
     "policy": ("bbtc.plan.policy", "plan_policy"),
     "auto": ("bbtc.plan.auto", "plan_auto"),
+    "advised": ("bbtc.plan.auto", "plan_advised"),
 }
 """Module and function of each strategy, imported when used."""
 
-DEFAULT = "auto"
+DEFAULT = "advised"
 
 
 def run_strategy(

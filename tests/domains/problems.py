@@ -19,7 +19,6 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
 from bbtc.plan.result import Plan
-from bbtc.plan.strategies import DEFAULT
 from bbtc.syntax.reader import read_source
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -39,13 +38,14 @@ class Problem:
 
     @property
     def strategy(self) -> str:
-        """How its artefacts are planned: the paper's domain as in the paper, the others by default."""
-        return "refine" if self.domain == "household" else DEFAULT
+        """How its artefacts are planned: the paper's domain as in the paper, the others with the smallest
+        trees."""
+        return "refine" if self.domain == "household" else "auto"
 
     @property
     def switches(self) -> list[str]:
         """What to tell ``bbtc plan`` for that."""
-        return [] if self.strategy == DEFAULT else ["--strategy", self.strategy]
+        return ["--strategy", self.strategy]
 
     def __str__(self) -> str:
         return f"{self.domain}/{self.name}"

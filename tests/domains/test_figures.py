@@ -90,7 +90,7 @@ def test_the_household_refines_as_in_the_paper() -> None:
 
 
 def test_the_household_says_so() -> None:
-    done = bbtc("plan", *Problem("household", "look-for-soda").files, "--strategy", "refine")
+    done = bbtc("plan", *Problem("household", "look-for-soda").files)
     assert done.status == 0
     assert "target 9/10 (0.9) reached: success probability 31/32 (0.96875)" in done.err
 

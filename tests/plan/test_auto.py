@@ -13,6 +13,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
 from bbtc.plan.result import Plan, Refinement
+from bbtc.plan.strategies import DEFAULT
 from bbtc.tree.nodes import walk
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.plan.test_refine import action, task
@@ -67,3 +68,16 @@ def test_what_is_out_of_reach_is_said_with_the_best_tree() -> None:
     done = plan(task("goal available", {1: T}, Is(0, T), once), "auto", "0.9")
     assert (done.tree.status, done.tree.bounds) == ("out-of-reach", (Fraction(1, 2), Fraction(1, 2)))
     assert done.tree.success_probability == Fraction(1, 2)
+
+
+def test_by_default_the_templates_of_a_domain_are_followed_if_that_reaches_the_target() -> None:
+    """In the household; not in the doors, which have none, nor where only another tree is good enough."""
+    soda, doors = (task_of(p) for p in PROBLEMS if str(p) in {"household/look-for-soda", "doors/to-the-lab"})
+    if not soda.templates:
+        soda, doors = doors, soda
+    assert plan(soda, DEFAULT).tree.root == plan(soda, "refine").tree.root
+    assert plan(soda, "auto").tree.root != plan(soda, "refine").tree.root
+    assert plan(doors, DEFAULT).tree.root == plan(doors, "auto").tree.root
+    sure = plan(soda, DEFAULT, "1")
+    assert sure.tree.success_probability == plan(soda, "auto", "1").tree.success_probability
+    assert sure.tree.success_probability > plan(soda, "refine", "1").tree.success_probability
