@@ -2,7 +2,8 @@
 
 A snippet is a block marked ``console``: lines that start with ``$ `` are commands for a shell, the
 lines after one are what it prints (stdout and stderr together); ``…`` alone on a line stands for any
-lines. All snippets of a page run in one fresh folder that shows the repository's ``domains``.
+lines. All snippets of a page run in one fresh folder that shows the repository's ``docs`` and
+``domains``.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ def pattern(expected: str) -> str:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
 def test_the_snippets_of_a_page_print_what_it_says(page: Path, tmp_path: Path) -> None:
-    (tmp_path / "domains").symlink_to(REPOSITORY / "domains")
+    for shown in ("docs", "domains"):
+        (tmp_path / shown).symlink_to(REPOSITORY / shown)
     shim = tmp_path / ".bin" / "bbtc"
     shim.parent.mkdir()
     shim.write_text(f'#!/bin/sh\nexec {sys.executable} -m bbtc.cli.main "$@"\n')
