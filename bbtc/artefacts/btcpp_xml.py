@@ -316,7 +316,7 @@ class _Reader:
         """The condition that an element is written for; None if it is a control node."""
         if inside_register(element) is not None:
             held: Condition = yield self._conditions.read(element, scope)
-            return held
+            return written(self._task, held)
         if has(element, "ReactiveSequence") or has(element, "ReactiveFallback"):
             # Conditions side by side: one condition if the name says so, otherwise each its own.
             if "name" not in element.attributes or not self._conditions.could_be(element):
@@ -328,7 +328,7 @@ class _Reader:
         if not self._conditions.is_condition(element):
             return None
         condition: Condition = yield self._conditions.read(element, scope)
-        return condition
+        return written(self._task, condition)
 
     def _condition_name(self, element: XmlElement, condition: Condition, scope: Scope) -> str | None:
         name = element.attributes.get("name", "")
