@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -17,9 +18,9 @@ def write(path: str, content: str | bytes, *, check: bool = False, scratch: str 
     """Write an artefact to ``path`` (``-``: stdout); whether anything was written.
 
     A file is written beside its place, or in the folder ``scratch`` if that is on the same file system,
-    and renamed; it is left untouched if it has the content already. With ``check`` nothing is
-    written, and a difference raises :class:`BbtcError` with a diff. Raises :class:`BbtcError` if
-    the file cannot be written.
+    and renamed; it is left untouched if it has the content already. A device or a pipe is written to as
+    it is. With ``check`` nothing is written, and a difference raises :class:`BbtcError` with a diff.
+    Raises :class:`BbtcError` if the file cannot be written.
     """
     data = content.encode() if isinstance(content, str) else content
     if path == "-":
@@ -28,6 +29,8 @@ def write(path: str, content: str | bytes, *, check: bool = False, scratch: str 
             sys.stdout.buffer.write(data)
             sys.stdout.buffer.flush()
         return not check
+    if _is_special(path):
+        return not check and _pour(path, data)
     try:
         old = Path(path).read_bytes()
     except FileNotFoundError:
@@ -39,6 +42,24 @@ def write(path: str, content: str | bytes, *, check: bool = False, scratch: str 
     if check:
         raise drift(path, old, data)
     _replace(path, data, scratch)
+    return True
+
+
+def _is_special(path: str) -> bool:
+    """Is it something that must not be renamed over, and need not give back what it was given?"""
+    try:
+        mode = Path(path).stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def _pour(path: str, data: bytes) -> bool:
+    try:
+        with Path(path).open("wb") as stream:
+            stream.write(data)
+    except OSError as error:
+        raise BbtcError.single("BBT0004", f"cannot write {path}: {error.strerror}") from error
     return True
 
 

@@ -1,28 +1,30 @@
-"""The stages in order: the only module that knows which follows which."""
+"""The stages in order: the only module that knows which follows which.
+
+Each stage is imported where it runs: who checks a file needs no planner in memory.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from bbtc.belief.chain import Chain, explore
-from bbtc.belief.simulate import Figures, figures, flow
-from bbtc.belief.soundness import violations
 from bbtc.diagnostics import BbtcError, Diagnostic, Related, Report, Severity
-from bbtc.export.registry import Artefact, load_exporter, parse_options
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
-from bbtc.plan.bounds import judged
 from bbtc.plan.options import DEFAULTS, Options
-from bbtc.plan.result import Plan, Progress
-from bbtc.plan.strategies import run_strategy
 from bbtc.source import SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import Status, Tree
-from bbtc.tree.validate import check_tree
-from bbtc.verify.verdict import Engine, Verdict, verify
+
+if TYPE_CHECKING:
+    from bbtc.belief.chain import Chain
+    from bbtc.belief.simulate import Figures
+    from bbtc.export.registry import Artefact
+    from bbtc.plan.result import Plan, Progress
+    from bbtc.verify.verdict import Engine, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,6 +261,12 @@ def plan_task(
     bug and raises ``AssertionError``. Raises :class:`bbtc.diagnostics.LimitReached` where the
     limits do not allow any tree at all.
     """
+    from bbtc.belief.chain import explore
+    from bbtc.belief.soundness import violations
+    from bbtc.plan.bounds import judged
+    from bbtc.plan.strategies import run_strategy
+    from bbtc.tree.validate import check_tree
+
     wanted = task.goal_probability if target is None else target
     plan = run_strategy(strategy, task, wanted, limits=limits, progress=progress, options=options)
     plan = judged(plan, limits, options)
@@ -271,6 +279,9 @@ def plan_task(
 
 def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
     """The exact figures of a tree, and the chain they come from. Raises ``LimitReached``."""
+    from bbtc.belief.chain import explore
+    from bbtc.belief.simulate import figures
+
     chain = explore(tree.task, tree.root, limits)
     return figures(tree.task, tree.root, chain), chain
 
@@ -285,6 +296,8 @@ def process_text(task: Task, form: str) -> str:
 def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
     """The figures of a tree, recomputed without the simulator and the planner. Raises
     ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer."""
+    from bbtc.verify.verdict import verify
+
     return verify(tree, limits, engine)
 
 
@@ -292,11 +305,15 @@ def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limit
     """The tree in an export format, the same whether it was just planned or read from a file. Raises
     :class:`BbtcError` for an unknown format or option and for a tree the format cannot hold."""
     from bbtc.artefacts.tree_json import carried
+    from bbtc.export.registry import load_exporter, parse_options
 
     tree = carried(tree)
     exporter = load_exporter(form)
     parsed = parse_options(exporter, options)
     reached = None
     if parsed.get("flow"):
+        from bbtc.belief.chain import explore
+        from bbtc.belief.simulate import flow
+
         reached = flow(tree.task, tree.root, explore(tree.task, tree.root, limits))
     return exporter.export(tree, parsed, reached)

@@ -93,7 +93,7 @@ def test_a_verified_plan_is_written_and_a_wrong_one_is_not(
     def other(tree: Tree, limits: Limits, engine: verdict.Engine) -> verdict.Verdict:
         return honest(replace(tree, success_probability=tree.success_probability / 2), limits, engine)
 
-    monkeypatch.setattr("bbtc.pipeline.verify", other)
+    monkeypatch.setattr("bbtc.verify.verdict.verify", other)
     done = bbtc("plan", *FILES, "--strategy", "refine", "-q", "--verify", "-o", str(out))
     assert done.status == 1
     assert not out.exists()
