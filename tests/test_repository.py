@@ -79,7 +79,7 @@ def test_built_in_exporters_are_what_they_are_registered_as(name: str) -> None:
     exporter = load_exporter(name)
     assert exporter.name == name
     assert exporter.description
-    assert exporter.suffix.startswith(".")
+    assert not exporter.suffix or exporter.suffix.startswith(".")  # none for a folder of files
     assert len({option.name for option in exporter.options}) == len(exporter.options)
 
 
