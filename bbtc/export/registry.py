@@ -89,8 +89,6 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
         "py_trees_robot": "bbtc.export.pytrees_robot:py_trees_robot",
         "prism": "bbtc.export.prism:prism",
         "jani": "bbtc.export.jani:jani",
-        "prism": "bbtc.export.prism:prism",
-        "jani": "bbtc.export.jani:jani",
         "mermaid": "bbtc.export.mermaid:mermaid",
         "text": "bbtc.export.text:text",
         "json": "bbtc.artefacts.formats:json_format",
