@@ -181,9 +181,7 @@ def scenarios(tree: Source | Tree | Plan, count: int, *, limits: Limits | None =
     return list(islice(runs(pipeline.simulate_tree(_tree(tree, limits), limits or Limits())[1]), count))
 
 
-def verify(
-    tree: Source | Tree | Plan, *, engine: Engine = "auto", limits: Limits | None = None
-) -> Verdict:
+def verify(tree: Source | Tree | Plan, *, engine: Engine = "auto", limits: Limits | None = None) -> Verdict:
     """The figures of a tree recomputed without the simulator and the planner, by our own solver, by Storm,
     or by both (``own``, ``storm``, ``all``; ``auto``: own, and Storm if it is installed). What is not
     as the tree claims stands in the verdict's ``problems``. Raises as :func:`simulate` does, and
@@ -191,6 +189,25 @@ def verify(
     from bbtc import pipeline
 
     return pipeline.verify_tree(_tree(tree, limits), limits or Limits(), engine)
+
+
+def import_tree(
+    file: Source,
+    *task: Source,
+    namespace: str = "",
+    limits: Limits | None = None,
+    report: Report | None = None,
+) -> Tree:
+    """The tree of an exported file, also of one that was edited, as ``bbtc import`` reads it; ``task`` is its
+    domain and problem, its compiled task, or the tree it was exported from. Where the file claims
+    figures that the tree does not have, a note goes to ``report``. Raises :class:`BbtcError` with
+    everything that cannot be read, and :class:`LimitReached`."""
+    from bbtc import pipeline
+
+    (source,), others = _read([file], limits), _read(task, limits)
+    return pipeline.import_tree(
+        source, others, Report() if report is None else report, limits or Limits(), namespace
+    )
 
 
 def export(

@@ -136,7 +136,10 @@ def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel: Path) -> N
     modules = {str(path.relative_to(REPOSITORY).as_posix()) for path in SOURCES}
     assert modules <= names
     tops = {name.partition("/")[0] for name in names}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"bbtc"}
+    assert {top for top in tops if not top.endswith((".dist-info", ".data"))} == {"bbtc"}
+    shared = {name.partition(".data/data/")[2] for name in names if ".data/" in name}
+    assert {name.rpartition("/")[0] for name in shared} == {"share/cmake/bbtc"}
+    assert {"bbtc/build/template/bbtc.yaml", "bbtc/cmake/bbtcConfig.cmake"} <= names
 
 
 def test_an_installed_wheel_reads_a_domain(wheel: Path, tmp_path: Path) -> None:

@@ -73,6 +73,7 @@ def command(
     if not watch:
         return once(force)
     while True:
+        watched = _Watched(file)  # before the build reads them: it may take long
         try:
             once(force)
         except BbtcError as error:
@@ -81,7 +82,7 @@ def command(
             session.show([*session.report])
         session.report = type(session.report)()
         session.say("waiting for changes; Ctrl-C ends")
-        _wait_for_change(file)
+        watched.wait_for_change()
         force = False
 
 
@@ -128,24 +129,30 @@ def _progress(session: Session) -> Iterator[Tell | None]:
         click.echo(f"\r{'':{shutil.get_terminal_size().columns - 1}}\r", err=True, nl=False)
 
 
-def _wait_for_change(manifest: Path) -> None:
-    """Return when the manifest or an input of the last build has changed, and has come to rest."""
-    from bbtc.build.runner import sources_of
+class _Watched:
+    """The manifest and what the trees are made from, as they were at a moment."""
 
-    files = sources_of(manifest)
+    def __init__(self, manifest: Path) -> None:
+        from bbtc.build.runner import sources_of
 
-    def stamps() -> list[tuple[int, int] | None]:
+        self._files = sources_of(manifest)
+        self._before = self._stamps()
+
+    def wait_for_change(self) -> None:
+        """Return when a file is not as it was at that moment, and has come to rest."""
+        while (now := self._stamps()) == self._before:
+            time.sleep(_POLL)
+        while True:
+            time.sleep(_POLL)
+            if now == (now := self._stamps()):
+                return
+
+    def _stamps(self) -> list[tuple[int, int] | None]:
         found: list[tuple[int, int] | None] = []
-        for file in files:
+        for file in self._files:
             try:
                 status = file.stat()
                 found.append((status.st_mtime_ns, status.st_size))
             except OSError:
                 found.append(None)
         return found
-
-    before = stamps()
-    while (now := stamps()) == before:
-        time.sleep(_POLL)
-    while now != (now := stamps()):
-        time.sleep(_POLL)

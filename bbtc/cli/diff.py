@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from bbtc.cli.output import write
 from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
+from bbtc.files import write
 
 
 @click.command("diff")

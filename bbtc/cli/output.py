@@ -1,4 +1,4 @@
-"""Writing, as the commands name it (see :mod:`bbtc.files`), and the line that shows progress on stderr."""
+"""The line that shows progress on stderr."""
 
 from __future__ import annotations
 
@@ -9,10 +9,7 @@ from dataclasses import dataclass, field
 
 import click
 
-from bbtc.files import drift, write, write_depfile
 from bbtc.limits import Stage
-
-__all__ = ["ProgressLine", "drift", "write", "write_depfile"]
 
 _QUIET = 1.0  # seconds until something is shown at all
 _PAUSE = 0.1  # seconds between two looks

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bbtc.cli.output import write
 from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
+from bbtc.files import write
 
 if TYPE_CHECKING:
     from bbtc.belief.chain import Chain

@@ -128,6 +128,24 @@ def test_the_runs_are_those_of_the_simulation() -> None:
     assert bbtc.scenarios(plan, 2) == runs[:2]
 
 
+def test_an_exported_tree_is_read_back(tmp_path: Path) -> None:
+    plan = bbtc.plan(DOMAIN, PROBLEM)
+    file = tmp_path / "tree.xml"
+    xml = bbtc.export(plan, "btcpp")
+    assert isinstance(xml, str)
+    file.write_text(xml)
+    assert bbtc.simulate(bbtc.import_tree(file, DOMAIN, PROBLEM)).success == Fraction(31, 32)
+
+
+def test_a_project_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "both.pddl").write_text(DOMAIN.read_text() + PROBLEM.read_text())
+    (tmp_path / "bbtc.yaml").write_text("trees: {soda: {domain: both.pddl, exports: [dot]}}\n")
+    monkeypatch.chdir(tmp_path)
+    assert [outcome.status for outcome in bbtc.build(jobs=1).outcomes] == ["built"]
+    assert bbtc.build("bbtc.yaml", "soda", check=True).ok
+    assert (tmp_path / "build/soda.dot").exists()
+
+
 def test_wrong_kinds_of_input_are_type_errors() -> None:
     task = bbtc.compile(DOMAIN, PROBLEM)
     with pytest.raises(TypeError, match="stands alone"):

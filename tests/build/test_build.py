@@ -471,9 +471,10 @@ def slow_project(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_ctrl_c_keeps_what_was_built(tmp_path: Path, jobs: str) -> None:
+def test_ctrl_c_keeps_what_was_built(tmp_path: Path, jobs: str, request: pytest.FixtureRequest) -> None:
     folder = slow_project(tmp_path)
     process = started(folder, "-j", jobs)
+    request.addfinalizer(process.kill)
     wait_until((folder / "build/quick.tree.json").exists)
     time.sleep(0.5)
     os.killpg(process.pid, signal.SIGINT)
@@ -507,9 +508,10 @@ def test_a_killed_build_leaves_no_process_behind(tmp_path: Path) -> None:
     wait_until(lambda: not alive())
 
 
-def test_watch_builds_again_after_a_change(tmp_path: Path) -> None:
+def test_watch_builds_again_after_a_change(tmp_path: Path, request: pytest.FixtureRequest) -> None:
     folder = several(tmp_path, 1)
     process = started(folder, "--watch", "-j", "1")
+    request.addfinalizer(process.kill)
     tree = folder / "build/t0.tree.json"
     wait_until(tree.exists)
     assert process.stderr is not None
@@ -519,7 +521,7 @@ def test_watch_builds_again_after_a_change(tmp_path: Path) -> None:
     whole = domain.read_text()
     for text, shown in [(whole + ")", "BBT0103"), (whole.replace("1/2", "4/5"), "success 4/5")]:
         domain.write_text(text)
-        lines = []
+        lines: list[str] = []
         while not lines or "waiting" not in lines[-1]:
             lines.append(process.stderr.readline())
             assert lines[-1], lines

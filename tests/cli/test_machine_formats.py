@@ -147,8 +147,7 @@ def test_any_name_of_a_file_makes_valid_sarif(name: str) -> None:
             "doubt",
             Span(source, 0, 0),
             None,
-            Severity.WARNING,
-            (Related("here", Span(source, 4, 5)),),
+            Severity.WARNING, related,
         ),
         Diagnostic("BBT0301", "note", None, None, Severity.NOTE),
     ]
