@@ -231,8 +231,9 @@ class StopWhenBlocked(Decorator):
         """A latch below is about to run its action in this tick."""
         # py_trees would interrupt the action that ran before only after this one has started: the
         # robot, asked for the same action by both, could not tell the second from the first.
-        if self._last is not None and self._last is not latch and self._last.status == Status.RUNNING:
-            self._last.stop(Status.INVALID)
+        last = self._last
+        if last is not None and last is not latch and last.status == Status.RUNNING:
+            last.stop(Status.INVALID)
         self._last = latch
         self._acting = True
 
