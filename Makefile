@@ -11,11 +11,12 @@ PIP_INSTALL := -m pip install --quiet --disable-pip-version-check
 OLDEST_PY_TREES := build/py_trees-2.2/py_trees
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint format golden pictures clean python-version
+.PHONY: help demo test lint docs format golden pictures clean python-version
 
 help:
 	@echo "make demo    from the household domain to trees that run, into $(OUT)/"
 	@echo "make test    all tests"
+	@echo "make docs    the documentation site, into site/"
 	@echo "make lint    ruff, mypy, import layers"
 	@echo "make format  lay out the Python code"
 	@echo "make golden  all tests, rewriting the golden files that drifted"
@@ -52,6 +53,9 @@ lint: .venv/dev/.installed
 format: .venv/dev/.installed
 	.venv/dev/bin/ruff check --fix .
 	.venv/dev/bin/ruff format .
+
+docs: .venv/dev/.installed
+	.venv/dev/bin/python -m mkdocs build --strict
 
 golden: .venv/dev/.installed $(OLDEST_PY_TREES)
 	.venv/dev/bin/python -m pytest $(PYTEST_ARGS) --update-golden

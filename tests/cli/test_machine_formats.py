@@ -147,7 +147,8 @@ def test_any_name_of_a_file_makes_valid_sarif(name: str) -> None:
             "doubt",
             Span(source, 0, 0),
             None,
-            Severity.WARNING, related,
+            Severity.WARNING,
+            related,
         ),
         Diagnostic("BBT0301", "note", None, None, Severity.NOTE),
     ]
