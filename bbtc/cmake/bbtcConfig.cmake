@@ -7,7 +7,7 @@
 #     [PROBLEM <file>]                 # unless the domain's file holds it
 #     [NAME <name>]                    # of the tree; default: the name of the problem's file
 #     [SUCCESS <probability>]          # the target probability; default: the problem's own
-#     [STRATEGY refine|policy|auto]
+#     [STRATEGY <strategy>]            # as `bbtc plan --strategy`
 #     [EXPORTS <format>=<file> ...]    # default: btcpp=<name>.xml btcpp_palette=<name>_nodes.xml
 #     [PLAN_OPTIONS <option> ...]      # more options of `bbtc plan`
 #     [OUTPUT_DIRECTORY <directory>])  # default: the current binary directory

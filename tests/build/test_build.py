@@ -80,7 +80,7 @@ def test_a_format_of_several_files_goes_into_a_folder(
             return registry.Files({"a.txt": "a\n", "sub/b.txt": "b\n"})
 
     original = registry.load_exporter
-    for module in (registry, pipeline, sys.modules["bbtc.manifest.read"]):
+    for module in (registry, sys.modules["bbtc.manifest.read"]):
         monkeypatch.setattr(
             module, "load_exporter", lambda form: Several() if form == "several" else original(form)
         )
@@ -130,7 +130,13 @@ def test_up_to_date_needs_no_manifest_parser_and_no_stage(tmp_path: Path) -> Non
         "print([name for name in heavy if name in sys.modules])\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=60
+        [sys.executable, "-c", code],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        env=environment(),
     )
     assert (done.stdout, done.stderr) == ("[]\n", "")
 
@@ -253,8 +259,8 @@ FAILING = {
     "folder": ("{domain: .}", 1, "BBT0001"),
     "out of reach": ("{domain: oneshot.pddl, target: 0.9}", 1, "BBT1004"),
     "expectation": ("{domain: coin.pddl, target: 0.5, expect: [cost > 100]}", 1, "BBT1005"),
-    "limit": ("{domain: coin.pddl, target: 0.999, limits: {nodes: 3}}", 3, "BBT1004"),
-    "options": ("{domain: coin.pddl, max-actions: 2}", 1, "BBT0503"),
+    "limit": ("{domain: coin.pddl, limits: {ground-actions: 0}}", 3, "BBT0007"),
+    "options": ("{domain: coin.pddl, strategy: refine, max-actions: 2}", 1, "BBT0503"),
     "file in the way": ("{domain: coin.pddl, target: 0.5, tree: coin.pddl/x.json}", 1, "BBT0004"),
 }
 ONESHOT = """(define (domain oneshot) (:predicates (done) (left))

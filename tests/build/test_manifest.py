@@ -16,6 +16,7 @@ from bbtc.diagnostics import BbtcError
 from bbtc.manifest.expectations import FIGURES
 from bbtc.manifest.find import find_manifest
 from bbtc.manifest.read import Manifest, read_manifest
+from bbtc.plan.strategies import DEFAULT, STRATEGIES
 
 REPOSITORY = Path(__file__).parents[2]
 SCHEMA: dict[str, Any] = json.loads((REPOSITORY / "docs" / "schemas" / "bbtc-manifest-1.json").read_text())
@@ -292,3 +293,8 @@ def test_the_schema_refuses_what_we_refuse(name: str) -> None:
 def test_the_schema_knows_every_figure_and_setting() -> None:
     pattern = SCHEMA["$defs"]["expectation"]["pattern"]
     assert all(f"|{figure}|" in pattern.replace("(", "|").replace(")", "|") for figure in FIGURES)
+
+
+def test_the_schema_knows_every_strategy() -> None:
+    strategy = SCHEMA["$defs"]["strategy"]
+    assert (set(strategy["enum"]), strategy["default"]) == (set(STRATEGIES), DEFAULT)
