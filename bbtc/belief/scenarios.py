@@ -43,12 +43,14 @@ _Path = tuple[int, "_Path | None"]  # last state, and the path before it
 
 def scenarios(chain: Chain) -> Iterator[Scenario]:
     """Every scenario in order of decreasing probability (ties in breadth-first order of the
-    states). Endless where the chain has loops: take as many as needed."""
+    states). Endless where the chain has loops: take as many as needed. Runs that never end are none."""
+    ending = _ending(chain)
     queue: list[tuple[Fraction, int, _Path]] = []
     count = 0
     for probability, state in chain.initial:
-        heapq.heappush(queue, (-probability, count, (state, None)))
-        count += 1
+        if state in ending:
+            heapq.heappush(queue, (-probability, count, (state, None)))
+            count += 1
     while queue:
         negative, _, path = heapq.heappop(queue)
         edges = chain.edges[path[0]]
@@ -57,10 +59,27 @@ def scenarios(chain: Chain) -> Iterator[Scenario]:
         # Results that differ in cost or reward only are one scenario.
         merged: dict[int, Fraction] = {}
         for edge in edges:
-            merged[edge.target] = merged.get(edge.target, Fraction(0)) + edge.result.probability
+            if edge.target in ending:
+                merged[edge.target] = merged.get(edge.target, Fraction(0)) + edge.result.probability
         for target, probability in merged.items():
             heapq.heappush(queue, (negative * probability, count, (target, path)))
             count += 1
+
+
+def _ending(chain: Chain) -> set[int]:
+    """The states from which a run may end."""
+    before: list[list[int]] = [[] for _ in chain.states]
+    for state, edges in enumerate(chain.edges):
+        for edge in edges:
+            before[edge.target].append(state)
+    ending = set(chain.final)
+    waiting = list(ending)
+    while waiting:
+        for state in before[waiting.pop()]:
+            if state not in ending:
+                ending.add(state)
+                waiting.append(state)
+    return ending
 
 
 def _scenario(chain: Chain, probability: Fraction, path: _Path) -> Scenario:

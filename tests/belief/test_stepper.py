@@ -32,8 +32,6 @@ def test_taking_the_outcomes_of_a_scenario_gives_that_scenario(tree: Tree) -> No
         chain = explore(tree.task, tree.root, Limits(states=300))
     except LimitReached:
         assume(False)
-    # Scenarios of a chain that never ends cannot be listed: no edge leads back.
-    assume(all(edge.target > state for state, edges in enumerate(chain.edges) for edge in edges))
     stepper = Stepper(tree.task, tree.root)
     for run in itertools.islice(scenarios(chain), 8):
         stepper.start(place(stepper.starts, run.initial))

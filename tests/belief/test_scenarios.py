@@ -1,0 +1,40 @@
+"""The list of scenarios holds the runs that end, and does not wait for the others."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from bbtc.belief.chain import explore
+from bbtc.belief.scenarios import scenarios
+from bbtc.ground.condition import TRUE, Is
+from bbtc.ground.task import GroundAction, Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+from tests.plan.test_refine import action, task
+
+T = Truth.TRUE
+
+
+def probabilities(of: Task, root: Node) -> list[Fraction]:
+    return [run.probability for run in scenarios(explore(of, root, Limits()))]
+
+
+def two_facts(*actions: GroundAction) -> Task:
+    return task("won lost", {}, Is(0, T), *actions)
+
+
+def test_a_run_without_end_is_no_scenario() -> None:
+    of = two_facts(action("wait", TRUE, ("1", {})))
+    assert probabilities(of, ActionNode("n1", "wait()", latched=False)) == []
+
+
+def test_runs_that_end_are_listed_where_others_go_on_for_ever() -> None:
+    """Once lost, the robot waits without end."""
+    toss = action("toss", TRUE, ("0.5", {0: T}), ("0.5", {1: T}))
+    of = two_facts(toss, action("wait", TRUE, ("1", {})))
+    waiting = ControlNode(
+        "n2", "sequence", (ConditionNode("n3", Is(1, T)), ActionNode("n4", "wait()", latched=False))
+    )
+    root = ControlNode("n1", "fallback", (ConditionNode("n5", Is(0, T)), waiting, ActionNode("n6", "toss()")))
+    assert probabilities(of, root) == [Fraction(1, 2)]
