@@ -50,13 +50,16 @@ def reference() -> str:
         "# All commands and options\n",
         "Made from the program itself; [commands](commands.md) tells more, with examples.\n",
         "## bbtc\n",
-        _described(click.Context(cli, info_name="bbtc")),
+        _described(cli.make_context("bbtc", [], resilient_parsing=True)),
     ]
     for name in COMMANDS:
-        root = click.Context(cli, info_name="bbtc")
+        root = cli.make_context("bbtc", [], resilient_parsing=True)
         command = cli.get_command(root, name)
         assert command is not None
-        parts += [f"## bbtc {name}\n", _described(click.Context(command, info_name=name, parent=root))]
+        parts += [
+            f"## bbtc {name}\n",
+            _described(command.make_context(name, [], root, resilient_parsing=True)),
+        ]
     return "\n".join(parts)
 
 
