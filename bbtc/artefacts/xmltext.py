@@ -50,7 +50,8 @@ def parse_xml(source: SourceFile) -> XmlDocument:
     try:
         parser.Parse(source.text.encode(), True)
     except expat.ExpatError as error:
-        start = len(source.text.encode()) if error.offset is None else parser.ErrorByteIndex
+        # Where nothing was found at all, the index is -1: the end of the text.
+        start = parser.ErrorByteIndex if parser.ErrorByteIndex >= 0 else len(source.text.encode())
         reason = expat.ErrorString(error.code)
         raise BbtcError.single(
             "BBT0614", f"not well-formed XML: {reason}", _span(source, start, None)
