@@ -159,7 +159,7 @@ def least(problem: Path) -> int:
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="tells the memory of a process")
 @pytest.mark.parametrize("how", ["--bounds", "--strategy=policy"])
 def test_a_limit_on_memory_is_met_within_a_tenth(problem: Path, least: int, how: str) -> None:
-    limit = least + 15
+    limit = least + 9
     unlimited = ("--max-states", "1000000000", "--max-nodes", "1000000000", "-q", "--target", "1/10")
     command = ("plan", str(problem), "--max-memory", str(limit), *unlimited)
     if how == "--bounds":
