@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from bbtc.belief.state import State, Transition, Values, compile_action, initial_belief
-from bbtc.belief.tick import STARTED, Status, compile_tick, memory_of
+from bbtc.belief.tick import STARTED, Status, Tick, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.tree.nodes import ActionNode, Node, actions_of
 
@@ -47,6 +47,16 @@ class Stepper:
     seed: int = 0
     moments: list[Moment] = field(default_factory=list, init=False)
     _transitions: dict[str, Transition] = field(default_factory=dict, init=False)
+    _statuses: dict[str, Status] = field(default_factory=dict, init=False)
+    _actions: list[ActionNode] = field(init=False)
+    _started: dict[str, int] = field(init=False)
+    _returned: Tick = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._actions = list(actions_of(self.root))
+        bits = memory_of(self.root).started
+        self._started = {node.id: bit for node, bit in zip(self._actions, bits, strict=True)}
+        self._returned = compile_tick(self.task, self.root, self._observe)
 
     @property
     def starts(self) -> tuple[Branch, ...]:
@@ -74,9 +84,8 @@ class Stepper:
         moment = self.now
         assert moment.action is not None
         index = self._draw(moment.branches, len(self.moments)) if choice is None else choice
-        order = [node.id for node in actions_of(self.root)]
-        started = memory_of(self.root).started[order.index(moment.action.id)]
-        self.moments.append(self._tick(State(moment.branches[index].values, moment.state.finished + started)))
+        finished = moment.state.finished + self._started[moment.action.id]
+        self.moments.append(self._tick(State(moment.branches[index].values, finished)))
 
     def back(self) -> bool:
         """Take the last step back; False at the start."""
@@ -93,16 +102,15 @@ class Stepper:
                 return index
         return len(branches) - 1
 
+    def _observe(self, node: Node, returned: int) -> None:
+        self._statuses[node.id] = Status.RUNNING if returned >= STARTED else Status(returned)
+
     def _tick(self, state: State) -> Moment:
-        statuses: dict[str, Status] = {}
-
-        def observe(node: Node, returned: int) -> None:
-            statuses[node.id] = Status.RUNNING if returned >= STARTED else Status(returned)
-
-        returned = compile_tick(self.task, self.root, observe)(state.values, state.finished)
+        statuses = self._statuses = {}
+        returned = self._returned(state.values, state.finished)
         if returned < STARTED:
             return Moment(state, statuses, Status(returned), None, ())
-        action = list(actions_of(self.root))[returned - STARTED]
+        action = self._actions[returned - STARTED]
         if action.action not in self._transitions:
             self._transitions[action.action] = compile_action(self.task.action_by_name[action.action])
         merged: dict[Values, Fraction] = {}

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,8 +61,8 @@ def command(
     file = Path(manifest) if manifest is not None else find_manifest(Path())
 
     def once(force: bool) -> int:
-        with _progress(session) as tell:
-            report = build(file, names=trees, jobs=jobs, check=check, force=force, tell=tell)
+        report = build(file, names=trees, jobs=jobs, check=check, force=force, tell=_bar(session))
+        session.clear()
         _tell(session, report, check=check, quiet=quiet)
         return _status(report)
 
@@ -110,23 +106,17 @@ def _status(report: BuildReport) -> int:
     return EXIT_LIMIT if kinds else 0
 
 
-@contextmanager
-def _progress(session: Session) -> Iterator[Tell | None]:
+def _bar(session: Session) -> Tell | None:
     """A bar on a terminal, nothing elsewhere."""
-    if session.form != "text" or not sys.stderr.isatty():
-        yield None
-        return
+    line = session.line
+    if line is None:
+        return None
 
     def tell(done: int, of: int, name: str) -> None:
         filled = _BAR * done // of
-        width = shutil.get_terminal_size().columns
-        line = f"[{'#' * filled}{'.' * (_BAR - filled)}] {done}/{of} {name}"
-        click.echo(f"\r{line[: width - 1]:{width - 1}}", err=True, nl=False)
+        line.show(f"[{'#' * filled}{'.' * (_BAR - filled)}] {done}/{of} {name}")
 
-    try:
-        yield tell
-    finally:
-        click.echo(f"\r{'':{shutil.get_terminal_size().columns - 1}}\r", err=True, nl=False)
+    return tell
 
 
 class _Watched:

@@ -6,7 +6,6 @@ import click
 
 from bbtc.cli.session import Session, grounding_limits, output_options
 from bbtc.cli.session import command as session_command
-from bbtc.files import write, write_depfile
 
 
 @click.command("compile")
@@ -55,6 +54,4 @@ def command(
             assert inputs is not None
             model = pipeline.resolve_model(inputs, session.report, checks=True)
             text = artefacts.dumps(artefacts.model_to_json(model))
-    write(output, text, check=check)
-    if depfile is not None:
-        write_depfile(depfile, output, session.inputs)
+    session.write(output, text, check=check, depfile=depfile)

@@ -16,7 +16,6 @@ from bbtc.cli.session import (
     command as session_command,
 )
 from bbtc.cli.verify import require_verified
-from bbtc.files import write, write_depfile, write_files
 from bbtc.plan.strategies import DEFAULT
 
 
@@ -70,12 +69,9 @@ def command(
     """Write TREE in FORMAT. With a DOMAIN and PROBLEM in its place, plan on the way."""
     from bbtc.cli.inputs import is_artefact, is_tree, task_of, tree_of
     from bbtc.cli.plan import STATUS_EXIT, run_planner
-    from bbtc.export.registry import Files, load_exporter
     from bbtc.pipeline import export_tree
 
-    # What cannot be is reported before any work.
-    if not load_exporter(form).suffix and output == "-":
-        raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
+    require_place(form, output)
     limits = session.limits
     sources = [session.read(file) for file in files]
     status = 0
@@ -88,14 +84,16 @@ def command(
         require_verified(session, tree)
     pairs = dict(_pair(option) for option in options)
     artefact = export_tree(tree, form, pairs, limits)
-    session.clear()
-    if isinstance(artefact, Files):
-        write_files(output, artefact.texts, check=check)
-    else:
-        write(output, artefact, check=check)
-    if depfile is not None:
-        write_depfile(depfile, output, session.inputs)
+    session.write(output, artefact, check=check, depfile=depfile)
     return status
+
+
+def require_place(form: str, output: str) -> None:
+    """Refuse, before any work, an unknown format, and to write several files to stdout."""
+    from bbtc.export.registry import load_exporter
+
+    if not load_exporter(form).suffix and output == "-":
+        raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
 
 
 def _pair(option: str) -> tuple[str, str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
+from bbtc.cli.export import require_place
 from bbtc.cli.session import Session, limit_options, output_options
 from bbtc.cli.session import command as session_command
-from bbtc.files import write, write_depfile, write_files
 
 
 @click.command("import")
@@ -32,17 +32,10 @@ def command(
     """Read FILE, which `bbtc export` wrote as btcpp or json and a person may have edited, and write the
     tree with its figures computed anew. BehaviorTree.CPP files need the task that they are about: a
     DOMAIN and PROBLEM, a compiled TASK, or the TREE that was exported."""
-    from bbtc.export.registry import Files, load_exporter
     from bbtc.pipeline import export_tree, import_tree
 
-    if not load_exporter(form).suffix and output == "-":
-        raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
+    require_place(form, output)
     sources = [session.read(path) for path in (file, *others)]
     tree = import_tree(sources[0], sources[1:], session.report, session.limits, namespace)
     artefact = export_tree(tree, form, {}, session.limits)
-    if isinstance(artefact, Files):
-        write_files(output, artefact.texts, check=check)
-    else:
-        write(output, artefact, check=check)
-    if depfile is not None:
-        write_depfile(depfile, output, session.inputs)
+    session.write(output, artefact, check=check, depfile=depfile)

@@ -23,7 +23,7 @@ from bbtc.cli.session import (
     command as session_command,
 )
 from bbtc.cli.verify import require_verified
-from bbtc.files import write, write_depfile
+from bbtc.files import write
 from bbtc.plan.strategies import DEFAULT
 
 if TYPE_CHECKING:
@@ -102,9 +102,8 @@ def command(
     plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet)
     if verified:
         require_verified(session, plan.tree)
-    write(output, artefacts.dumps(artefacts.tree_to_json(plan.tree)), check=check)
-    if depfile is not None:
-        write_depfile(depfile, output, session.inputs)
+    text = artefacts.dumps(artefacts.tree_to_json(plan.tree))
+    session.write(output, text, check=check, depfile=depfile)
     return STATUS_EXIT[plan.tree.status]
 
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any, NoReturn, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, cast
 
 import click
 
@@ -16,8 +16,12 @@ from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT
 from bbtc.cli.output import ProgressLine
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
+from bbtc.files import write, write_depfile, write_files
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
+
+if TYPE_CHECKING:
+    from bbtc.export.registry import Artefact
 
 
 @dataclass(slots=True)
@@ -53,6 +57,16 @@ class Session:
 
         self.inputs.append(path)
         return read_source(path, self.limits.file_bytes)
+
+    def write(self, output: str, artefact: Artefact, *, check: bool, depfile: str | None) -> None:
+        """Write what a command made, as ``-o``, ``--check`` and ``--depfile`` ask."""
+        self.clear()
+        if isinstance(artefact, str | bytes):
+            write(output, artefact, check=check)
+        else:
+            write_files(output, artefact.texts, check=check)
+        if depfile is not None:
+            write_depfile(depfile, output, self.inputs)
 
     def show(self, diagnostics: Sequence[Diagnostic]) -> None:
         """Write diagnostics to stderr in the session's form (the machine forms even if empty)."""

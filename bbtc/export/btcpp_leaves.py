@@ -30,7 +30,23 @@ class Robot {
   virtual ~Robot() = default;
 """
 
-_LEAVES = """\
+ACCESS = """\
+/// The id of the tree to run.
+inline constexpr const char* kMainTree = MAIN_TREE;
+
+/// The value of a port.
+inline std::string argument(const BT::TreeNode& node, const std::string& port) {
+  const auto value = node.getInput<std::string>(port);
+  if (!value) {
+    throw BT::RuntimeError(node.name(), ": ", value.error());
+  }
+  return value.value();
+}
+"""
+"""C++ that every flavour of the leaves begins with."""
+
+_LEAVES = (
+    """\
 // The leaves of the tree: a class for each condition and action. Made by bbtc; no need to edit it.
 #pragma once
 
@@ -45,23 +61,15 @@ _LEAVES = """\
 
 namespace ROBOT_TREE {
 
-/// The id of the tree to run.
-inline constexpr const char* kMainTree = MAIN_TREE;
-
-/// The value of a port.
-inline std::string argument(const BT::TreeNode& node, const std::string& port) {
-  const auto value = node.getInput<std::string>(port);
-  if (!value) {
-    throw BT::RuntimeError(node.name(), ": ", value.error());
-  }
-  return value.value();
-}
-
+"""
+    + ACCESS
+    + """
 /// SUCCESS, FAILURE or RUNNING for true, false or unknown.
 inline BT::NodeStatus statusOf(std::optional<bool> value) {
   return !value ? BT::NodeStatus::RUNNING : *value ? BT::NodeStatus::SUCCESS : BT::NodeStatus::FAILURE;
 }
 """
+)
 
 _STUB = """\
 // A robot to start from: copy this file to my_robot.hpp, and fill it in there.

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 
 from bbtc.export import cppcode
-from bbtc.export.btcpp_leaves import Program
+from bbtc.export.btcpp_leaves import ACCESS, Program
 from bbtc.export.btcpp_names import BtcppNames
 from bbtc.export.btcpp_palette import port_text, signature
 from bbtc.export.interface import Leaf
@@ -162,7 +162,8 @@ string[] arguments
 uint8 value
 """
 
-_HEAD = """\
+_HEAD = (
+    """\
 // The leaves of the tree as clients in ROS 2. Made by bbtc: a start, to be adapted to your interfaces.
 #pragma once
 
@@ -179,18 +180,9 @@ INCLUDES
 
 namespace ROBOT_TREE {
 
-/// The id of the tree to run.
-inline constexpr const char* kMainTree = MAIN_TREE;
-
-/// The value of a port.
-inline std::string argument(const BT::TreeNode& node, const std::string& port) {
-  const auto value = node.getInput<std::string>(port);
-  if (!value) {
-    throw BT::RuntimeError(node.name(), ": ", value.error());
-  }
-  return value.value();
-}
-
+"""
+    + ACCESS
+    + """
 /// A condition reads the latest beliefs; it answers at once, with RUNNING where the fact is unknown.
 class BeliefCondition : public BT::RosTopicSubNode<PACKAGE::msg::Beliefs> {
  public:
@@ -219,6 +211,7 @@ class BeliefCondition : public BT::RosTopicSubNode<PACKAGE::msg::Beliefs> {
   std::shared_ptr<Beliefs> latest_;
 };
 """
+)
 
 _CONDITION = """\
 /// TOLD

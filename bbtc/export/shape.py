@@ -27,7 +27,7 @@ from bbtc.ground.condition import (
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task, Variable, ground_name
 from bbtc.kleene import Truth
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, tree_depth
 
 DEEPEST_TREE = 250
 """Levels of nodes an exported tree may have: BehaviorTree.CPP reads 256 levels of XML, and py_trees
@@ -53,17 +53,6 @@ def fit(root: Node, engine: str) -> Node:
                 hint="plan with a lower target or with templates of their own for parts of the task",
             )
     return root
-
-
-def tree_depth(root: Node) -> int:
-    """The number of levels of a tree. Iterative: any tree can be measured."""
-    deepest, stack = 0, [(root, 1)]
-    while stack:
-        node, level = stack.pop()
-        deepest = max(deepest, level)
-        if isinstance(node, ControlNode):
-            stack.extend((child, level + 1) for child in node.children)
-    return deepest
 
 
 def _merged(root: Node) -> Node:

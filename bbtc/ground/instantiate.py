@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from fractions import Fraction
 from itertools import compress, repeat
 from operator import itemgetter
 
 from typing_extensions import assert_never
 
+from bbtc.collector import collector_paused
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.atoms import Atoms
@@ -40,7 +39,7 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """
     if model.templates:
         return prune(instantiate(model, report, limits))
-    with _collector_paused():
+    with collector_paused():
         begin, reached = _reached(model, report, limits)
         atoms = Atoms(reached)
         goal = _goal(model, atoms, report, limits)
@@ -55,27 +54,10 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
 def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """:func:`ground` without leaving out what cannot matter to the goal: every action that can apply
     and do something, or that a template calls."""
-    with _collector_paused():
+    with collector_paused():
         begin, reached = _reached(model, report, limits)
         builder = _TaskBuilder(Atoms(reached), report, begin, limits)
         return builder.task(reached.actions)
-
-
-@contextmanager
-def _collector_paused() -> Iterator[None]:
-    """Millions of small objects are made, none of them in a cycle: looking for cycles meanwhile
-    takes longer than making them."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            if not gc.get_freeze_count():
-                # Counts everything as old at once, which otherwise happens by looking at it thrice.
-                gc.freeze()
-                gc.unfreeze()
-            gc.enable()
 
 
 def _reached(model: md.Model, report: Report, limits: Limits) -> tuple[Beginning, Reach]:

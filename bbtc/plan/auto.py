@@ -46,19 +46,7 @@ def plan_auto(
     refinements are told to ``progress`` only if their tree is kept. Raises
     :class:`bbtc.diagnostics.LimitReached` only if the limits do not even allow the simulation of the
     initial belief."""
-    if options.max_actions is not None:
-        return plan_policy(task, target, limits, progress, options)
-    plans = [plan_search(task, target, limits, _silent, options)]
-    if plans[0].tree.status != "interrupted":
-        second = _policy(task, target, limits, options, plans[0])
-        plans.extend([] if second is None else [second])
-        if all(plan.tree.status != "interrupted" for plan in plans):
-            third = _refine(task, target, limits, min(plans, key=_rank))
-            plans.extend([] if third is None else [third])
-    kept = min(plans, key=_rank)
-    for step in kept.refinements:
-        progress(step)
-    return _with_findings(kept, plans)
+    return _told(_best(task, target, limits, options, None), progress)
 
 
 def plan_advised(
@@ -66,17 +54,36 @@ def plan_advised(
 ) -> Plan:
     """Plan by refinement where the task has templates, else, and where that falls short of the target, by
     :func:`plan_auto`, and as that does."""
+    advised = None
     if task.templates and len(task.actions) <= MANY_ACTIONS and options == DEFAULTS:
-        plan = refine(task, target, replace(limits, states=min(limits.states, _REFINE_STATES)), _silent)
-        if plan.tree.status in {"target-reached", "interrupted"}:
-            for step in plan.refinements:
-                progress(step)
-            return plan
-    return plan_auto(task, target, limits, progress, options)
+        advised = _refined(task, target, limits, limits.nodes)
+        if advised.tree.status in {"target-reached", "interrupted"}:
+            return _told(advised, progress)
+    return _told(_best(task, target, limits, options, advised), progress)
+
+
+def _told(plan: Plan, progress: Progress) -> Plan:
+    for step in plan.refinements:
+        progress(step)
+    return plan
 
 
 def _silent(step: Refinement) -> None:
     del step
+
+
+def _best(task: Task, target: Fraction, limits: Limits, options: Options, refined: Plan | None) -> Plan:
+    """The best plan; ``refined`` is what refinement made, if it fell short of the target before."""
+    if options.max_actions is not None:
+        return plan_policy(task, target, limits, _silent, options)
+    plans = [plan_search(task, target, limits, _silent, options)]
+    if plans[0].tree.status != "interrupted":
+        second = _policy(task, target, limits, options, plans[0])
+        plans.extend([] if second is None else [second])
+        if all(plan.tree.status != "interrupted" for plan in plans):
+            third = _refine(task, target, limits, min(plans, key=_rank), refined)
+            plans.extend([] if third is None else [third])
+    return _with_findings(min(plans, key=_rank), plans)
 
 
 def _policy(task: Task, target: Fraction, limits: Limits, options: Options, known: Plan) -> Plan | None:
@@ -92,7 +99,7 @@ def _policy(task: Task, target: Fraction, limits: Limits, options: Options, know
     return found
 
 
-def _refine(task: Task, target: Fraction, limits: Limits, best: Plan) -> Plan | None:
+def _refine(task: Task, target: Fraction, limits: Limits, best: Plan, refined: Plan | None) -> Plan | None:
     tree = best.tree
     most = limits.nodes
     if tree.status == "target-reached":
@@ -101,14 +108,19 @@ def _refine(task: Task, target: Fraction, limits: Limits, best: Plan) -> Plan | 
             return None
     elif tree.bounds is not None and tree.success_probability == tree.bounds[1]:
         return None  # nothing can do better
+    if refined is not None:
+        return None if tree.status == "target-reached" else refined
     if most < 1:
         return None
     try:
-        return refine(
-            task, target, replace(limits, nodes=most, states=min(limits.states, _REFINE_STATES)), _silent
-        )
+        return _refined(task, target, limits, most)
     except LimitReached:  # not even the goal alone is small enough
         return None
+
+
+def _refined(task: Task, target: Fraction, limits: Limits, nodes: int) -> Plan:
+    few = replace(limits, nodes=nodes, states=min(limits.states, _REFINE_STATES))
+    return refine(task, target, few, _silent)
 
 
 def _rank(plan: Plan) -> tuple[bool, Fraction, int, bool, Fraction]:

@@ -8,6 +8,7 @@ included, and its fixed point is optimal among them (Bertsekas and Tsitsiklis 19
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -95,26 +96,23 @@ class _System:
         there downwards (from below, cycles without cost would hide the way out)."""
         values = np.zeros(self.graph.states)
         own = policy[self.states]
-        for step in range(_MOST_SWEEPS):
-            after = self.choice_values(values)[own]
-            moved = np.abs(after - values[self.states]).max()
-            values[self.states] = after
-            if moved < 1e-13 * max(1.0, float(after.max())):
-                break
-            if step % 64 == 0:
-                limits.check_time("the search for the least cost")
+        self._sweep(values, lambda found: found[own], limits)
         choices = np.flatnonzero(self.allowed)
         # Choices are ordered by state, and every open state has an allowed one.
         first = np.searchsorted(self.graph.choice_state[choices], self.states)
+        self._sweep(values, lambda found: np.minimum.reduceat(found[choices], first), limits)
+        return values
+
+    def _sweep(self, values: Floats, choose: Callable[[Floats], Floats], limits: Limits) -> None:
+        """Give every open state what ``choose`` makes of the values of the choices, until they rest."""
         for step in range(_MOST_SWEEPS):
-            after = np.minimum.reduceat(self.choice_values(values)[choices], first)
+            after = choose(self.choice_values(values))
             moved = np.abs(after - values[self.states]).max()
             values[self.states] = after
             if moved < 1e-13 * max(1.0, float(after.max())):
                 break
             if step % 64 == 0:
                 limits.check_time("the search for the least cost")
-        return values
 
     def ties(self, values: Floats) -> Flags:
         """Allowed choices that attain their state's cost, as far as floats tell."""

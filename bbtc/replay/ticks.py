@@ -35,7 +35,7 @@ class Tick:
 
 
 class TickWorld:
-    """Plays a script for any engine, and writes down what it does. See :class:`tests.replay.script.World`."""
+    """Plays a script for any engine, and writes down what it does. See :class:`bbtc.replay.script.World`."""
 
     def __init__(self, task: Task, script: TickScript) -> None:
         self.ticks: list[Tick] = []

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import lru_cache
 
+from bbtc.collector import collector_paused
 from bbtc.diagnostics import Report
 from bbtc.source import SourceFile, Span
 from bbtc.syntax import ast, scan
@@ -41,7 +39,7 @@ def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast
         return ast.Document(source)
     token = SOURCE.set(source)
     try:
-        with _collector_paused():
+        with collector_paused():
             definitions = _definitions(text, source, report, max_depth)
             comments = scan.comments(source)
     finally:
@@ -49,24 +47,6 @@ def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast
     if not definitions and not report.errors:
         report.error("BBT0003", f"{source.name} holds no domain and no problem")
     return ast.Document(source, definitions, comments)
-
-
-@contextmanager
-def _collector_paused() -> Iterator[None]:
-    """Syntax nodes hold no cycles; looking for some again and again while the nodes grow in number
-    takes as long as making them."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            if not gc.get_freeze_count():
-                # Straight to the old generation with them, or the collector would go through all of
-                # them as soon as it is enabled.
-                gc.freeze()
-                gc.unfreeze()
-            gc.enable()
 
 
 def _definitions(text: str, source: SourceFile, report: Report, max_depth: int) -> tuple[ast.Definition, ...]:

@@ -111,6 +111,17 @@ def walk(node: Node) -> Iterator[Node]:
                 assert_never(node)
 
 
+def tree_depth(root: Node) -> int:
+    """The number of levels of a tree. Iterative: any tree can be measured."""
+    deepest, stack = 0, [(root, 1)]
+    while stack:
+        node, level = stack.pop()
+        deepest = max(deepest, level)
+        if isinstance(node, ControlNode):
+            stack.extend((child, level + 1) for child in node.children)
+    return deepest
+
+
 def retries_of(node: Node) -> Iterator[tuple[ControlNode, int]]:
     """The retry nodes, parents before children, from left to right, each with its attempts."""
     for each in walk(node):

@@ -24,7 +24,7 @@ from typing_extensions import assert_never
 from bbtc.ground.condition import variables
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, tree_depth, walk
 from bbtc.verify.conditions import where_false, where_true
 from bbtc.verify.outcomes import MOST_BRANCHES, Outcomes, relevant
 from bbtc.verify.program import (
@@ -77,7 +77,7 @@ def chain_of(
     is true), ``unready`` (an action starts where its precondition is not true).
     """
     if form is None:
-        if _levels(root) > DEEPEST_TREE:
+        if tree_depth(root) > DEEPEST_TREE:
             return chain_of(task, root, "walk", most_branches)
         program = chain_of(task, root, "guards", most_branches)
         roots = [*program.roots(), *(formula.expression for formula in program.formulas)]
@@ -103,17 +103,7 @@ def chain_of(
 
 def solvable_chain(task: Task, root: Node) -> Program:
     """The Markov chain with the fewest states, for a solver that computes each formula but once."""
-    return chain_of(task, root, "walk" if _levels(root) > DEEPEST_TREE else "guards")
-
-
-def _levels(root: Node) -> int:
-    deepest, stack = 0, [(root, 1)]
-    while stack:
-        node, level = stack.pop()
-        deepest = max(deepest, level)
-        if isinstance(node, ControlNode):
-            stack.extend((child, level + 1) for child in node.children)
-    return deepest
+    return chain_of(task, root, "walk" if tree_depth(root) > DEEPEST_TREE else "guards")
 
 
 @dataclass(slots=True)

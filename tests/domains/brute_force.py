@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from bbtc.ground.task import Factor, Outcome, Task
+from bbtc.replay.script import Values
 from bbtc.tree.nodes import Node
 from tests.replay.reference import Ticking, value_of
-from tests.replay.script import Values
 
 
 @dataclass

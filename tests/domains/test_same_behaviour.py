@@ -11,9 +11,9 @@ import pytest
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
 from bbtc.limits import Limits
+from bbtc.replay.script import TIMINGS, run_of, script_of
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
-from tests.replay.script import TIMINGS, run_of, script_of
 
 MOST = 500
 """Scenarios of a problem, the most probable first; most problems have fewer."""

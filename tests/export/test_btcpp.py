@@ -19,12 +19,12 @@ from bbtc.export.shape import DEEPEST_CONDITION, DEEPEST_TREE
 from bbtc.ground.condition import TRUE, And, Condition, Is, Known, Not, Or
 from bbtc.ground.task import GroundAction, InitialState, Task, Variable
 from bbtc.kleene import Truth
+from bbtc.replay.engines import BtcppReplay, PyTreesReplay
+from bbtc.replay.script import TIMINGS, Run, Script
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from tests.conftest import Golden
-from tests.replay.engines import BtcppReplay, PyTreesReplay
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import STATUS, random_run, value_of, varied_runs
-from tests.replay.script import TIMINGS, Run, Script
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 

@@ -24,13 +24,13 @@ from bbtc.export.pytrees_runtime import MODULES, used_in
 from bbtc.export.registry import load_exporter, parse_options
 from bbtc.export.shape import DEEPEST_TREE
 from bbtc.ground.task import Task
+from bbtc.replay.engines import PyTreesReplay
+from bbtc.replay.script import Run, Script
 from bbtc.tree.nodes import Tree, actions_of
 from tests.conftest import Golden
 from tests.export.test_btcpp import nested
-from tests.replay.engines import PyTreesReplay
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import random_run
-from tests.replay.script import Run, Script
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 REPOSITORY = Path(__file__).resolve().parents[2]

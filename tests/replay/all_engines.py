@@ -9,8 +9,8 @@ from typing import Literal, TypeAlias
 
 import pytest
 
+from bbtc.replay.engines import BtcppReplay, Engine, PyTreesReplay
 from bbtc.tree.nodes import Tree
-from tests.replay.engines import BtcppReplay, Engine, PyTreesReplay
 from tests.replay.oldest import oldest_py_trees
 
 Runtime: TypeAlias = Literal["embedded", "imported"]

@@ -18,8 +18,8 @@ import pytest
 from bbtc.export.btcpp import btcpp
 from bbtc.export.btcpp_names import btcpp_names
 from bbtc.ground.task import ground_name
+from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing
 from bbtc.tree.nodes import Tree
-from tests.replay.script import OffScript, Run, Script, ScriptedWorld, Timing
 
 REPOSITORY = Path(__file__).parents[2]
 NODES = REPOSITORY / "bbtc" / "export" / "cpp"

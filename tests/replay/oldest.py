@@ -17,8 +17,8 @@ from typing import Any, Literal
 
 import pytest
 
+from bbtc.replay.script import Run, Script, Timing
 from bbtc.tree.nodes import Tree
-from tests.replay.script import Run, Script, Timing
 from tests.replay.ticks import Tick, TickScript
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -98,7 +98,7 @@ def _answers() -> Iterator[object]:
     import py_trees
     import py_trees.version
 
-    from tests.replay.engines import PyTreesReplay
+    from bbtc.replay.engines import PyTreesReplay
 
     assert Path(py_trees.__file__).is_relative_to(FOLDER)
     replay: PyTreesReplay | None = None

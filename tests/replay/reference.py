@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
+from bbtc.replay.script import Run, Script, Values
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
-from tests.replay.script import Run, Script, Values
 from tests.replay.ticks import Tick, TickScript, TickWorld
 
 AND = {"TT": "T", "TU": "U", "TF": "F", "UT": "U", "UU": "U", "UF": "F", "FT": "F", "FU": "F", "FF": "F"}

@@ -9,9 +9,9 @@ import pytest
 from bbtc.ground.condition import TRUE, Condition, Is
 from bbtc.ground.task import GroundAction, InitialState, Task, Variable
 from bbtc.kleene import Truth
+from bbtc.replay.engines import BtcppReplay, PyTreesReplay
+from bbtc.replay.script import TIMINGS, Run, Script, Timing
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
-from tests.replay.engines import BtcppReplay, PyTreesReplay
-from tests.replay.script import TIMINGS, Run, Script, Timing
 from tests.replay.ticks import Tick, TickScript, TickWorld
 
 P, Q, R = (Is(index, Truth.TRUE) for index in range(3))

@@ -13,12 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
 from bbtc.limits import Limits
+from bbtc.replay.script import TIMINGS, run_of, script_of
 from bbtc.tree.nodes import Tree
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.replay.compiled import CompiledReplay, CompiledStockReplay, require_library
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import random_run, varied_runs
-from tests.replay.script import TIMINGS, run_of, script_of
 from tests.strategies import HOSTILE_NAMES, trees
 
 TREES = 1000 if os.environ.get("BBTC_LONG") else 60

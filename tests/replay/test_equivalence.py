@@ -17,11 +17,11 @@ import pytest
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import Scenario, scenarios
 from bbtc.limits import Limits
+from bbtc.replay.script import Timing, run_of, script_of
 from bbtc.tree.nodes import Tree
 from tests.replay.all_engines import ENGINES, Compared, EngineName, Runtime, engine
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import expected_run
-from tests.replay.script import Timing, run_of, script_of
 
 LONG = bool(os.environ.get("BBTC_LONG"))
 CHUNKS = 8

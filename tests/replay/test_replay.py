@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from bbtc.replay.script import TIMINGS, Run, Script
 from bbtc.tree.nodes import Tree
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import varied_runs
-from tests.replay.script import TIMINGS, Run, Script
 
 TREES = 1000 if os.environ.get("BBTC_LONG") else 200
 

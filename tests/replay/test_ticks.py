@@ -9,11 +9,11 @@ from collections.abc import Callable, Hashable
 
 import pytest
 
+from bbtc.replay.script import Values
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import Running, expected_ticks, value_of
-from tests.replay.script import Values
 from tests.replay.ticks import TickWorld, random_script
 
 TREES = 2000 if os.environ.get("BBTC_LONG") else 200
