@@ -65,7 +65,8 @@ def _interrupted_at_once() -> Iterator[None]:
     def stop(_number: int, _frame: object) -> None:
         raise _Interrupted
 
-    if threading.current_thread() is not threading.main_thread():
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN  # by whoever started us
+    if ignored or threading.current_thread() is not threading.main_thread():
         yield
         return
     before = signal.signal(signal.SIGINT, stop)
