@@ -9,12 +9,16 @@
 #     [SUCCESS <probability>]          # the target probability; default: the problem's own
 #     [STRATEGY <strategy>]            # as `bbtc plan --strategy`
 #     [EXPORTS <format>=<file> ...]    # default: btcpp=<name>.xml btcpp_palette=<name>_nodes.xml
+#     [CPP]                            # the leaves and the interface of the robot, in C++, too
+#     [NODES stock|bbtc]               # as `bbtc export --to btcpp -O nodes=...`
+#     [NAMESPACE <name>]               # and -O namespace=...; several trees of one program need it
 #     [PLAN_OPTIONS <option> ...]      # more options of `bbtc plan`
 #     [OUTPUT_DIRECTORY <directory>])  # default: the current binary directory
 #
 # Plans a tree and exports it, whenever the domain or the problem has changed, and adds the files to the
 # sources of <target> (a library, an executable, or a custom target). The variable <target>_BBTC_FILES lists
-# all that were made for the target so far, for install(FILES ...).
+# all that were made for the target so far, for install(FILES ...); not so what CPP makes: headers in a folder
+# <name>, to be included as "<name>/leaves.hpp", "<name>/robot.hpp" and "<name>/robot_stub.hpp".
 
 cmake_minimum_required(VERSION 3.20)
 
@@ -34,7 +38,8 @@ endif()
 
 function(bbtc_add_tree target)
   cmake_parse_arguments(
-    PARSE_ARGV 1 arg "" "DOMAIN;PROBLEM;NAME;SUCCESS;STRATEGY;OUTPUT_DIRECTORY" "EXPORTS;PLAN_OPTIONS")
+    PARSE_ARGV 1 arg "CPP" "DOMAIN;PROBLEM;NAME;SUCCESS;STRATEGY;NODES;NAMESPACE;OUTPUT_DIRECTORY"
+    "EXPORTS;PLAN_OPTIONS")
   if(NOT TARGET "${target}")
     message(FATAL_ERROR "bbtc_add_tree: there is no target '${target}'")
   endif()
@@ -85,6 +90,14 @@ function(bbtc_add_tree target)
     COMMENT "Planning ${arg_NAME}"
     VERBATIM)
 
+  set(btcpp_options)
+  if(arg_NODES)
+    list(APPEND btcpp_options -O "nodes=${arg_NODES}")
+  endif()
+  if(arg_NAMESPACE)
+    list(APPEND btcpp_options -O "namespace=${arg_NAMESPACE}")
+  endif()
+
   set(files "${tree}")
   foreach(export IN LISTS arg_EXPORTS)
     if(NOT export MATCHES "^([^=]+)=(.+)$")
@@ -94,9 +107,13 @@ function(bbtc_add_tree target)
     get_filename_component(file "${CMAKE_MATCH_2}" ABSOLUTE BASE_DIR "${directory}")
     get_filename_component(parent "${file}" DIRECTORY)
     file(MAKE_DIRECTORY "${parent}")
+    set(options)
+    if(format MATCHES "^btcpp")
+      set(options ${btcpp_options})
+    endif()
     add_custom_command(
       OUTPUT "${file}"
-      COMMAND "${BBTC_EXECUTABLE}" export "${tree}" --to "${format}" -o "${file}"
+      COMMAND "${BBTC_EXECUTABLE}" export "${tree}" --to "${format}" ${options} -o "${file}"
       COMMAND "${CMAKE_COMMAND}" -E touch "${file}"
       DEPENDS "${tree}"
       COMMENT "Exporting ${arg_NAME} to ${format}"
@@ -104,8 +121,34 @@ function(bbtc_add_tree target)
     list(APPEND files "${file}")
   endforeach()
 
-  target_sources("${target}" PRIVATE ${files})
+  set(sources ${files})
   get_target_property(type "${target}" TYPE)
+  if(arg_CPP)
+    if(type STREQUAL "UTILITY")
+      message(FATAL_ERROR "bbtc_add_tree: CPP is for a library or an executable, which '${target}' is not")
+    endif()
+    set(headers robot.hpp robot_stub.hpp leaves.hpp simulated_robot.hpp simulated_world.hpp)
+    if(arg_NODES STREQUAL "bbtc")
+      list(APPEND headers bbtc_nodes.hpp)
+    endif()
+    list(TRANSFORM headers PREPEND "${directory}/${arg_NAME}/")
+    # The stamp tells what was made from what. Headers that stay as they are keep their times: what includes
+    # them is not compiled again.
+    set(stamp "${directory}/${arg_NAME}.cpp.stamp")
+    add_custom_command(
+      OUTPUT "${stamp}"
+      BYPRODUCTS ${headers}
+      COMMAND "${BBTC_EXECUTABLE}" export "${tree}" --to btcpp_project ${btcpp_options} -o
+              "${directory}/${arg_NAME}"
+      COMMAND "${CMAKE_COMMAND}" -E touch "${stamp}"
+      DEPENDS "${tree}"
+      COMMENT "Exporting ${arg_NAME} to C++"
+      VERBATIM)
+    list(APPEND sources "${stamp}" ${headers})
+    target_include_directories("${target}" PRIVATE "${directory}")
+  endif()
+
+  target_sources("${target}" PRIVATE ${sources})
   if(type STREQUAL "UTILITY")
     # Sources of a custom target are not made for it by themselves.
     string(MAKE_C_IDENTIFIER "${target}_${arg_NAME}" id)

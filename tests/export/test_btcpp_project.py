@@ -75,14 +75,16 @@ def assert_succeeds_as_often(program: Path, success: Fraction, *arguments: str, 
 @pytest.mark.parametrize("nodes", ["stock", "bbtc"])
 @pytest.mark.parametrize("name", ["household/look-for-soda", "charging/night-round"])
 def test_the_program_of_a_domain_compiles_and_succeeds_as_often_as_simulated(
-    name: str, nodes: str, tmp_path: Path
+    name: str, nodes: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (problem,) = [problem for problem in PROBLEMS if str(problem) == name]
     tree = plan_of(problem).tree
     success = simulate_tree(tree, Limits())[0].success
     build = built(tmp_path, tree, nodes=nodes)
     assert_succeeds_as_often(build / "simulate", success)
-    assert_succeeds_as_often(build / "simulate", success, "--ticks", "3", "--seed", "7")
+    monkeypatch.chdir(tmp_path)
+    options = ("--ticks", "3", "--seed", "7", "--tree", "tree.xml")
+    assert_succeeds_as_often(build / "simulate", success, *options)
     assert "The tree returned " in ran(build / "simulate", "--seed", "1")
     # The stub knows nothing and can do nothing.
     assert ran(build / "main") == "The tree returned FAILURE.\n"

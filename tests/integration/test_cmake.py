@@ -10,7 +10,7 @@ import pytest
 
 from bbtc.version import __version__
 from tests.build.projects import COIN
-from tests.integration.tools import REPOSITORY, edit, program, run, runs, tool
+from tests.integration.tools import REPOSITORY, edit, program, recipe, run, runs, tool
 
 CMAKE_DIR = REPOSITORY / "bbtc" / "cmake"
 DOMAIN, _, PROBLEM = COIN.partition("(define (problem")
@@ -25,11 +25,57 @@ bbtc_add_tree(robot DOMAIN both.pddl NAME again EXPORTS "py_trees=sub dir/again.
 install(FILES ${robot_BBTC_FILES} DESTINATION share/robot)
 """
 
-COMPILED = """cmake_minimum_required(VERSION 3.20)
+HEAD = """cmake_minimum_required(VERSION 3.20)
 project(robot CXX)
+"""
+
+LEAVES = """cmake_minimum_required(VERSION 3.20)
+project(robot CXX)
+set(CMAKE_CXX_STANDARD 17)
 find_package(bbtc REQUIRED)
 add_executable(robot main.cpp)
-bbtc_add_tree(robot DOMAIN domain.pddl PROBLEM throws.pddl SUCCESS 0.75)
+target_include_directories(robot PRIVATE engine)
+bbtc_add_tree(robot DOMAIN domain.pddl PROBLEM throws.pddl SUCCESS 0.75 CPP NAMESPACE coin)
+"""
+ROBOT = """#include <cstdio>
+#include "throws/robot_stub.hpp"
+int main() { std::puts(coin_tree::MyRobot().isHeads() ? "heads" : "unknown"); }
+"""
+# So much of the engine's header as the interface of the robot needs.
+ENGINE = """#pragma once
+namespace BT { enum class NodeStatus { IDLE, RUNNING, SUCCESS, FAILURE, SKIPPED }; }
+"""
+
+WITH_LIBRARY = """cmake_minimum_required(VERSION 3.20)
+project(robot CXX)
+set(CMAKE_CXX_STANDARD 17)
+find_package(bbtc REQUIRED)
+find_package(behaviortree_cpp REQUIRED)
+add_executable(robot main.cpp)
+target_link_libraries(robot PRIVATE BT::behaviortree_cpp)
+target_compile_definitions(robot PRIVATE TREES="${CMAKE_CURRENT_BINARY_DIR}")
+bbtc_add_tree(robot DOMAIN domain.pddl PROBLEM throws.pddl SUCCESS 0.75 CPP NAMESPACE once NODES bbtc)
+bbtc_add_tree(robot DOMAIN domain.pddl PROBLEM throws.pddl SUCCESS 0.75 NAME again CPP
+  NAMESPACE again NODES bbtc)
+"""
+TWO_TREES = """#include <iostream>
+#include <behaviortree_cpp/bt_factory.h>
+#include "again/leaves.hpp"
+#include "again/robot_stub.hpp"
+#include "throws/leaves.hpp"
+#include "throws/robot_stub.hpp"
+
+int main() {
+  BT::BehaviorTreeFactory factory;
+  once_tree::MyRobot first;
+  again_tree::MyRobot second;
+  once_tree::registerLeaves(factory, first);
+  again_tree::registerLeaves(factory, second);
+  factory.registerBehaviorTreeFromFile(TREES "/throws.xml");
+  factory.registerBehaviorTreeFromFile(TREES "/again.xml");
+  std::cout << BT::toStr(factory.createTree(once_tree::kMainTree).tickWhileRunning())
+            << BT::toStr(factory.createTree(again_tree::kMainTree).tickWhileRunning()) << std::endl;
+}
 """
 
 GENERATORS = {"Ninja": "ninja", "Unix Makefiles": "make"}
@@ -117,11 +163,77 @@ def test_a_broken_domain_fails_the_build_with_its_place(source: Path) -> None:
 def test_a_compiled_program_has_its_trees_beside_it(source: Path) -> None:
     if shutil.which("c++") is None and shutil.which("g++") is None:
         pytest.skip("no C++ compiler")
-    (source / "CMakeLists.txt").write_text(COMPILED)
+    (source / "CMakeLists.txt").write_text(HEAD + recipe("cmake"))
+    (source / "look-for-soda.pddl").write_text((source / "throws.pddl").read_text())
     build = configure(source, "Unix Makefiles")
     assert sorted(make(build)) == ["export", "export", "plan"]
-    assert (build / "throws.xml").exists()
+    assert (build / "look-for-soda.xml").exists()
     assert make(build) == []
+
+
+@pytest.mark.parametrize("generator", GENERATORS)
+def test_a_program_is_compiled_with_the_interface_of_its_robot(source: Path, generator: str) -> None:
+    if shutil.which("c++") is None:
+        pytest.skip("no C++ compiler")
+    (source / "CMakeLists.txt").write_text(LEAVES)
+    (source / "main.cpp").write_text(ROBOT)
+    header = source / "engine" / "behaviortree_cpp" / "basic_types.h"
+    header.parent.mkdir(parents=True)
+    header.write_text(ENGINE)
+    build = configure(source, generator)
+    assert sorted(make(build)) == ["export"] * 3 + ["plan"]
+    assert run(build / "robot", cwd=build) == "unknown\n"
+    compiled = (build / "robot").stat().st_mtime_ns
+    assert make(build) == []
+    # Chances are no part of the interface: nothing is compiled.
+    edit(source / "domain.pddl", "1/2", "0.8")
+    assert sorted(make(build)) == ["export"] * 3 + ["plan"]
+    assert (build / "robot").stat().st_mtime_ns == compiled
+    assert make(build) == []
+    # Another name of a condition is.
+    for name in ("domain.pddl", "throws.pddl"):
+        edit(source / name, "heads", "tails")
+    edit(source / "main.cpp", "isHeads", "isTails")
+    make(build)
+    assert (build / "robot").stat().st_mtime_ns != compiled
+    assert make(build) == []
+
+
+def test_the_headers_that_cmake_expects_are_those_that_are_made() -> None:
+    from bbtc.export.btcpp_project import btcpp_project
+    from tests.strategies import soda_tree
+
+    config = (CMAKE_DIR / "bbtcConfig.cmake").read_text()
+    plain = config.partition("set(headers ")[2].partition(")")[0].split()
+    ours = config.partition("list(APPEND headers ")[2].partition(")")[0].split()
+    for options, expected in (({}, plain), ({"nodes": "bbtc"}, plain + ours)):
+        made = btcpp_project.export(soda_tree(), options, None).texts
+        assert sorted(name for name in made if name.endswith(".hpp")) == sorted(expected)
+
+
+def test_two_trees_run_in_one_program_with_the_real_library(source: Path) -> None:
+    from tests.replay.compiled import require_library
+
+    require_library()
+    (source / "CMakeLists.txt").write_text(WITH_LIBRARY)
+    (source / "main.cpp").write_text(TWO_TREES)
+    build = configure(source, "Ninja")
+    make(build)
+    assert run(build / "robot", cwd=build) == "FAILUREFAILURE\n"  # the stubs can do nothing
+    assert make(build) == []
+
+
+def test_the_program_of_the_page_runs_with_the_real_library(source: Path) -> None:
+    from tests.replay.compiled import require_library
+
+    require_library()
+    (source / "CMakeLists.txt").write_text(HEAD + recipe("cmake-cpp"))
+    (source / "main.cpp").write_text(recipe("c++"))
+    for name in ("domain.pddl", "look-for-soda.pddl"):
+        shutil.copy(REPOSITORY / "domains" / "household" / name, source)
+    build = configure(source, "Ninja")
+    make(build)
+    assert run(build / "robot", cwd=build) == ""
 
 
 def test_files_are_installed(source: Path) -> None:
@@ -139,6 +251,7 @@ def test_files_are_installed(source: Path) -> None:
         ("bbtc_add_tree(robot PROBLEM both.pddl)", "DOMAIN is missing"),
         ("bbtc_add_tree(robot DOMAIN both.pddl EXPORTS btcpp)", "is not <format>=<file>"),
         ("bbtc_add_tree(robot DOMAIN both.pddl DOMIAN x)", "unknown arguments"),
+        ("bbtc_add_tree(robot DOMAIN both.pddl CPP)", "CPP is for a library or an executable"),
     ],
 )
 def test_wrong_calls_are_told(source: Path, call: str, told: str) -> None:

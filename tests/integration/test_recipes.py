@@ -13,17 +13,10 @@ import pytest
 import yaml
 
 from tests.build.projects import COIN
-from tests.integration.tools import REPOSITORY, edit, program, run, runs, tool
+from tests.integration.tools import REPOSITORY, edit, program, recipe, run, runs, tool
 
 PAGE = (REPOSITORY / "docs" / "build-systems.md").read_text("utf-8")
 DOMAIN, _, PROBLEM = COIN.partition("(define (problem")
-
-
-def recipe(name: str) -> str:
-    """The block after a mark."""
-    found = re.search(rf"^<!-- {name} -->\n\n```\w+\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-    assert found is not None
-    return found[1]
 
 
 @pytest.fixture

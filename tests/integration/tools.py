@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,14 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).parents[2]
+
+
+def recipe(name: str) -> str:
+    """The block after a mark in the page on build systems."""
+    page = (REPOSITORY / "docs" / "build-systems.md").read_text("utf-8")
+    found = re.search(rf"^<!-- {re.escape(name)} -->\n\n```\w+\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert found is not None
+    return found[1]
 
 
 def tool(name: str) -> str:

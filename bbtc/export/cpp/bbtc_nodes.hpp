@@ -1,6 +1,7 @@
 // Control nodes of belief behavior trees for BehaviorTree.CPP 4.6 and later: Skipper and Latch.
 // C++17, this header only. Part of bbtc (Apache-2.0); https://www.apache.org/licenses/LICENSE-2.0
-#pragma once
+#ifndef BBTC_NODES_HPP  // not "pragma once": each tree of a program may bring along its own copy
+#define BBTC_NODES_HPP
 
 #include <optional>
 #include <string>
@@ -121,10 +122,15 @@ class Latch : public BT::ControlNode {
   std::string flag_;
 };
 
-/// Makes a factory know both nodes.
+/// Makes a factory know both nodes, unless it does so already.
 inline void registerNodes(BT::BehaviorTreeFactory& factory) {
+  if (factory.builders().count("Skipper") != 0 && factory.builders().count("Latch") != 0) {
+    return;
+  }
   factory.registerNodeType<Skipper>("Skipper");
   factory.registerNodeType<Latch>("Latch");
 }
 
 }  // namespace bbtc
+
+#endif  // BBTC_NODES_HPP

@@ -1,6 +1,8 @@
 // Runs the tree in the simulated world. Made by bbtc; no need to edit it.
 //   simulate [--seed N] [--runs N] [--ticks N] [--tree FILE]
+#include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
 #include <stdexcept>
 #include <string>
@@ -60,7 +62,7 @@ int main(int count, char** arguments) {
     ROBOT_TREE::SimulatedRobot robot(options.seed, options.ticks, options.runs == 1 ? &std::cout : nullptr);
     BT::BehaviorTreeFactory factory;
     ROBOT_TREE::registerLeaves(factory, robot);
-    factory.registerBehaviorTreeFromFile(options.tree);
+    factory.registerBehaviorTreeFromFile(std::filesystem::absolute(options.tree));
     unsigned successes = 0;
     for (unsigned number = 0; number < options.runs; ++number) {
       robot.world().restart();
