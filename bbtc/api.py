@@ -19,9 +19,13 @@ from bbtc.limits import Limits
 from bbtc.source import SourceFile
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from bbtc.belief.scenarios import Scenario
     from bbtc.belief.simulate import Figures
+    from bbtc.belief.stepper import Stepper
     from bbtc.build.runner import BuildReport
+    from bbtc.comparison import Comparison
     from bbtc.export.registry import Artefact
     from bbtc.ground.task import Task
     from bbtc.model.domain import Model
@@ -191,6 +195,28 @@ def verify(tree: Source | Tree | Plan, *, engine: Engine = "auto", limits: Limit
     return pipeline.verify_tree(_tree(tree, limits), limits or Limits(), engine)
 
 
+def run(tree: Source | Tree | Plan, *, seed: int = 0, limits: Limits | None = None) -> Stepper:
+    """A run of a tree in the simulated world, at its first tick: ``step()`` takes it on by a drawn outcome
+    of the running action, ``step(n)`` by outcome number n (from 0), ``back()`` takes it back; ``now`` is
+    the last tick, ``finished`` whether it was the last of the run. The same seed draws the same.
+
+    Raises :class:`BbtcError` for a file that is no tree.
+    """
+    from bbtc.belief.stepper import Stepper
+
+    planned = _tree(tree, limits)
+    stepper = Stepper(planned.task, planned.root, seed)
+    stepper.start()
+    return stepper
+
+
+def diff(old: Source | Tree | Plan, new: Source | Tree | Plan, *, limits: Limits | None = None) -> Comparison:
+    """What changed from one tree to another: figures, task, and nodes. Raises as :func:`simulate`."""
+    from bbtc import pipeline
+
+    return pipeline.compare_trees(_tree(old, limits), _tree(new, limits), limits or Limits())
+
+
 def import_tree(
     file: Source,
     *task: Source,
@@ -245,6 +271,14 @@ def build(
 
     file = find_manifest(Path()) if manifest is None else Path(manifest)
     return run(file, names=names, jobs=jobs, check=check, force=force)
+
+
+def init(folder: str | os.PathLike[str] = ".") -> tuple[Path, ...]:
+    """Make a small project to start from; the files made. Raises :class:`BbtcError` where one of them is
+    there already, and then makes none."""
+    from bbtc.build.starter import make_project
+
+    return make_project(folder)
 
 
 def explain(code: str) -> str:

@@ -22,6 +22,7 @@ from bbtc.tree.nodes import Status, Tree
 if TYPE_CHECKING:
     from bbtc.belief.chain import Chain
     from bbtc.belief.simulate import Figures
+    from bbtc.comparison import Comparison
     from bbtc.export.registry import Artefact
     from bbtc.plan.result import Plan, Progress
     from bbtc.verify.verdict import Engine, Verdict
@@ -291,6 +292,14 @@ def process_text(task: Task, form: str) -> str:
     from bbtc.export import jani, prism
 
     return prism.task_text(task) if form == "prism" else jani.task_text(task)
+
+
+def compare_trees(old: Tree, new: Tree, limits: Limits) -> Comparison:
+    """What changed from one tree to another, with the figures of both. Raises :class:`LimitReached`."""
+    from bbtc.comparison import compare
+
+    first, second = ((tree, simulate_tree(tree, limits)[0]) for tree in (old, new))
+    return compare(first, second)
 
 
 def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:

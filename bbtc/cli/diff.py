@@ -26,13 +26,12 @@ from bbtc.files import write
 @session_command
 def command(session: Session, old: str, new: str, form: str, exit_code: bool, output: str) -> int:
     """Tell what changed from the tree OLD to the tree NEW: figures, task, and nodes."""
-    from bbtc.cli.diff_report import compare, markdown_report, text_report
+    from bbtc.cli.diff_report import markdown_report, text_report
     from bbtc.cli.inputs import tree_of
-    from bbtc.pipeline import simulate_tree
+    from bbtc.pipeline import compare_trees
 
-    trees = [tree_of(session.read(path)) for path in (old, new)]
-    first, second = ((tree, simulate_tree(tree, session.limits)[0]) for tree in trees)
-    comparison = compare(first, second)
+    first, second = (tree_of(session.read(path)) for path in (old, new))
+    comparison = compare_trees(first, second, session.limits)
     session.clear()
     lines = markdown_report(comparison) if form == "markdown" else text_report(comparison)
     write(output, "".join(f"{line}\n" for line in lines))

@@ -3,121 +3,42 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from typing import Any
 
-from bbtc.artefacts import task_to_json
-from bbtc.belief.simulate import Figures
 from bbtc.cli.wording import counted, exact
+from bbtc.comparison import Comparison, FigureChange
 from bbtc.export.names import printable
 from bbtc.export.outline import UNICODE, label, outline
-from bbtc.ground.task import Task
-from bbtc.tree.difference import Difference, counts, differences
-from bbtc.tree.nodes import Node, Tree, actions_of, walk
-
-_FIGURES = ("success", "failure", "blocked", "endless", "cost", "actions")
+from bbtc.tree.difference import Difference, counts
+from bbtc.tree.nodes import walk
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
-    """A figure of both trees; None is infinite. ``differs`` where they are not equal."""
-
+class _Row:
     name: str
     old: str
     new: str
     change: str
-
-    @property
-    def differs(self) -> bool:
-        """Are the two not the same?"""
-        return self.old != self.new or bool(self.change)
+    differs: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """All that is told: rows of figures, sentences on the task, and the alignment of the nodes."""
-
-    old: Tree
-    new: Tree
-    rows: tuple[Row, ...]
-    task: tuple[str, ...]
-    nodes: Difference
-
-    @property
-    def differs(self) -> bool:
-        """Is there any difference, but for the ids of nodes and what they were inserted for?"""
-        return any(row.differs for row in self.rows) or bool(self.task) or self.nodes.mark != "same"
+def _rows(comparison: Comparison) -> list[_Row]:
+    old, new = comparison.old.status, comparison.new.status
+    return [*map(_row, comparison.figures), _Row("status", old, new, "", old != new)]
 
 
-def compare(old: tuple[Tree, Figures], new: tuple[Tree, Figures]) -> Comparison:
-    """The comparison of two trees with their figures."""
-    first, second = old[0], new[0]
-    rows = [_row(name, getattr(old[1], name), getattr(new[1], name)) for name in _FIGURES]
-    sizes = [Fraction(sum(1 for _ in walk(tree.root))) for tree in (first, second)]
-    kinds = [Fraction(len({node.action for node in actions_of(tree.root)})) for tree in (first, second)]
-    rows += [
-        _row("nodes", *sizes),
-        _row("different actions", *kinds),
-        _row("target", first.target, second.target),
-    ]
-    rows.append(Row("status", first.status, second.status, ""))
-    nodes = differences(first.root, second.root, _keys(first.task), _keys(second.task))
-    return Comparison(first, second, tuple(rows), tuple(_task_changes(first.task, second.task)), nodes)
-
-
-def _row(name: str, old: Fraction | None, new: Fraction | None) -> Row:
+def _row(figure: FigureChange) -> _Row:
     change = ""
-    if old is not None and new is not None and old != new:
-        difference = new - old
+    if figure.old is not None and figure.new is not None and figure.differs:
+        difference = figure.new - figure.old
         change = f"{'+' if difference > 0 else '-'}{float(abs(difference)):.4g}"
-    texts = ["infinite" if value is None else exact(value) for value in (old, new)]
-    return Row(name, texts[0], texts[1], change)
-
-
-class _keys:  # noqa: N801 (used as a function)
-    """What a node is, but for its id, its reason and its children."""
-
-    def __init__(self, task: Task) -> None:
-        self._task = task
-
-    def __call__(self, node: Node) -> Hashable:
-        return type(node), label(self._task, node)
-
-
-def _task_changes(old: Task, new: Task) -> Iterator[str]:
-    first: Mapping[str, Any] = task_to_json(old)
-    second: Mapping[str, Any] = task_to_json(new)
-    for what in ("domain", "problem", "goal_probability", "goal", "metric", "goal_reward"):
-        if first.get(what) != second.get(what):
-            yield f"{what.replace('_', ' ')} changed"
-    if _named(first["variables"]) == _named(second["variables"]) and first["initial"] != second["initial"]:
-        yield "initial state changed"
-    for noun in ("variable", "action"):
-        before, after = _named(first[f"{noun}s"]), _named(second[f"{noun}s"])
-        for name in sorted({*before, *after}):
-            if name not in after:
-                yield f"{noun} {printable(name)} removed"
-            elif name not in before:
-                yield f"{noun} {printable(name)} added"
-            elif before[name] != after[name]:
-                parts = [
-                    key.replace("_", " ") for key in after[name] if before[name].get(key) != after[name][key]
-                ]
-                yield f"{noun} {printable(name)} changed: {', '.join(parts) or 'fields left out'}"
-
-
-def _named(values: list[Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
-    return {str(value["name"]): value for value in values}
-
-
-# --- text and Markdown -----------------------------------------------------------------------
+    old, new = ("infinite" if value is None else exact(value) for value in (figure.old, figure.new))
+    return _Row(figure.name, old, new, change, figure.differs)
 
 
 def text_report(comparison: Comparison) -> list[str]:
     """The comparison for a terminal: a table, sentences, and the tree with ``+`` and ``-``."""
-    table = [["", "old", "new", ""], *([r.name, r.old, r.new, r.change] for r in comparison.rows)]
+    table = [["", "old", "new", ""], *([r.name, r.old, r.new, r.change] for r in _rows(comparison))]
     widths = [max(len(row[column]) for row in table) for column in range(4)]
     lines = [
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -133,7 +54,7 @@ def markdown_report(comparison: Comparison) -> list[str]:
     lines = [f"### {_code(name)}", "", "| figure | old | new | change |", "|---|---|---|---|"]
     lines += [
         f"| {row.name} | {row.old} | {row.new} | {row.change} |"
-        for row in comparison.rows
+        for row in _rows(comparison)
         if row.differs or row.name in {"success", "nodes"}
     ]
     if comparison.task:

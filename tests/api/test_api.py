@@ -137,6 +137,48 @@ def test_an_exported_tree_is_read_back(tmp_path: Path) -> None:
     assert bbtc.simulate(bbtc.import_tree(file, DOMAIN, PROBLEM)).success == Fraction(31, 32)
 
 
+def test_a_run_goes_where_it_is_told_and_back() -> None:
+    plan = bbtc.plan(DOMAIN, PROBLEM, target=0.5)
+    run = bbtc.run(plan, seed=3)
+    while not run.finished:
+        run.step(0)
+    assert (run.now.status.word, run.now.state.values) != ("running", run.moments[0].state.values)
+    ends = run.moments
+    assert run.back()
+    assert run.now == ends[len(run.moments) - 1]
+    drawn = [bbtc.run(plan, seed=seed) for seed in (3, 3, *range(20))]
+    for each in drawn:
+        while not each.finished:
+            each.step()
+    assert drawn[0].moments == drawn[1].moments
+    statuses = {each.now.status.word for each in drawn}
+    assert statuses == {"success", "failure"}
+
+
+def test_a_difference_tells_what_the_command_tells(tmp_path: Path) -> None:
+    old, new = bbtc.plan(DOMAIN, PROBLEM, target=0.5), bbtc.plan(DOMAIN, PROBLEM, target=0.8)
+    changes = bbtc.diff(old, new)
+    assert changes.differs
+    assert not bbtc.diff(old, old).differs
+    success = next(figure for figure in changes.figures if figure.name == "success")
+    assert (success.old, success.new) == (Fraction(1, 2), Fraction(7, 8))
+    assert [figure.name for figure in changes.figures if figure.differs and figure.name == "target"]
+    for name, plan in (("old", old), ("new", new)):
+        (tmp_path / name).write_text(bbtc.dumps(plan))
+    told = command("diff", str(tmp_path / "old"), str(tmp_path / "new")).out.decode()
+    for figure in changes.figures:
+        assert figure.name in told
+    assert changes == bbtc.diff(tmp_path / "old", tmp_path / "new")
+
+
+def test_a_project_is_made_once(tmp_path: Path) -> None:
+    made = bbtc.init(tmp_path / "made")
+    assert all(path.is_file() for path in made)
+    assert bbtc.build(tmp_path / "made" / "bbtc.yaml", jobs=1).ok
+    with pytest.raises(bbtc.BbtcError, match="BBT1007"):
+        bbtc.init(tmp_path / "made")
+
+
 def test_a_project_is_built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "both.pddl").write_text(DOMAIN.read_text() + PROBLEM.read_text())
     (tmp_path / "bbtc.yaml").write_text("trees: {soda: {domain: both.pddl, exports: [dot]}}\n")
@@ -166,6 +208,15 @@ def test_a_tree_draws_itself_in_a_notebook() -> None:
 
 
 # --- the package -----------------------------------------------------------------------------
+
+
+def test_every_command_has_its_function() -> None:
+    from bbtc.cli.main import COMMANDS
+
+    other_names = {"fmt": "format_text", "import": "import_tree"}  # "import" is a word of the language
+    assert len(COMMANDS) > 10
+    for name in COMMANDS:
+        assert other_names.get(name, name) in bbtc.__all__
 
 
 def test_everything_named_is_there_and_documented() -> None:
