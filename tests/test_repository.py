@@ -83,6 +83,32 @@ def test_built_in_exporters_are_what_they_are_registered_as(name: str) -> None:
     assert len({option.name for option in exporter.options}) == len(exporter.options)
 
 
+def test_the_page_on_architecture_names_every_part() -> None:
+    page = text_of(REPOSITORY / "docs" / "architecture.md")
+    table = page.partition("## The map")[2].partition("## Where a change goes")[0]
+    places = [row.split("|")[1] for row in table.splitlines() if row.startswith("| `")]
+    named = re.findall(r"`([\w./]+)`", "\n".join(places))
+    parts = {
+        f"{path.name}/" if path.is_dir() else path.name
+        for path in (REPOSITORY / "bbtc").iterdir()
+        if path.name not in {"__pycache__", "__init__.py"}
+    }
+    assert parts <= {*named}
+    assert {*named} <= parts
+    for name in re.findall(r"`([\w/]+\.(?:py|md|lark))`", page):
+        assert any((REPOSITORY / top / name).exists() for top in ("", "bbtc")), name
+
+
+def test_the_page_on_tests_names_every_long_form() -> None:
+    page = text_of(REPOSITORY / "tests" / "README.md")
+    sweeps = {
+        path.relative_to(REPOSITORY).as_posix()
+        for path in (REPOSITORY / "tests").rglob("test_*.py")
+        if re.search("^from tests.long_form import", text_of(path), re.MULTILINE)
+    }
+    assert set(re.findall(r"^\| `(tests/[\w/]+\.py)`", page, re.MULTILINE)) == sweeps
+
+
 # --- commands --------------------------------------------------------------------------------
 
 

@@ -17,9 +17,10 @@ import pytest
 
 from bbtc.build.runner import build
 from tests.build.projects import REPOSITORY, bbtc, several
+from tests.long_form import amount
 
 TREES = 10
-KILLS = 100 if os.environ.get("BBTC_LONG") else 5
+KILLS = amount(5, 100)
 
 
 def artefacts(folder: Path) -> dict[str, bytes]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import os
 import random
 from xml.etree import ElementTree as ET
 
@@ -15,9 +14,10 @@ from bbtc.export.btcpp import btcpp
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import Tree
 from bbtc.tree.validate import check_tree
+from tests.long_form import amount
 from tests.replay.random_trees import random_tree
 
-MUTANTS = 20_000 if os.environ.get("BBTC_LONG") else 600
+MUTANTS = amount(600, 20_000)
 
 Parents = dict[ET.Element, ET.Element]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from fractions import Fraction
 
 import pytest
@@ -18,12 +17,13 @@ from bbtc.plan.heuristic_search import search_bounds
 from bbtc.plan.space import explore_space
 from bbtc.plan.value import reachability
 from bbtc.plan.value_best import best_known
+from tests.long_form import amount
 from tests.plan.examples import Optimum, cases, public
 from tests.plan.test_refine import action, task
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
-MANY = 5000 if os.environ.get("BBTC_LONG") else 100
+MANY = amount(100, 5000)
 """Random tasks of one kind."""
 
 

@@ -4,7 +4,6 @@ final state as in the reference. Skipped where CMake finds no BehaviorTree.CPP."
 from __future__ import annotations
 
 import itertools
-import os
 import random
 
 import pytest
@@ -16,13 +15,14 @@ from bbtc.limits import Limits
 from bbtc.replay.script import TIMINGS, run_of, script_of
 from bbtc.tree.nodes import Tree
 from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.long_form import amount
 from tests.replay.compiled import CompiledReplay, CompiledStockReplay, require_library
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import random_run, varied_runs
 from tests.strategies import HOSTILE_NAMES, trees
 
-TREES = 1000 if os.environ.get("BBTC_LONG") else 60
-MOST = 500 if os.environ.get("BBTC_LONG") else 60
+TREES = amount(60, 1000)
+MOST = amount(60, 500)
 
 PROFILES = pytest.mark.parametrize(
     "engine", [CompiledReplay, CompiledStockReplay], ids=lambda engine: engine.profile

@@ -9,7 +9,6 @@ four; ``BBTC_LONG=1`` takes up to 500.
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -19,16 +18,16 @@ from bbtc.belief.scenarios import Scenario, scenarios
 from bbtc.limits import Limits
 from bbtc.replay.script import Timing, run_of, script_of
 from bbtc.tree.nodes import Tree
+from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, Runtime, engine
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import expected_run
 
-LONG = bool(os.environ.get("BBTC_LONG"))
 CHUNKS = 8
 TREES = 125
 """Trees of a chunk."""
 
-MOST = 500 if LONG else 30
+MOST = amount(30, 500)
 """Scenarios of a tree, the most probable first."""
 
 TIMINGS: tuple[Timing, ...] = ("between", "during", "within")

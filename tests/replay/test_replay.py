@@ -3,18 +3,18 @@ any outcomes: same actions, same end, same final state."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 
 import pytest
 
 from bbtc.replay.script import TIMINGS, Run, Script
 from bbtc.tree.nodes import Tree
+from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import varied_runs
 
-TREES = 1000 if os.environ.get("BBTC_LONG") else 200
+TREES = amount(200, 1000)
 
 
 def lively_trees() -> Iterator[tuple[Tree, list[tuple[Script, Run]]]]:

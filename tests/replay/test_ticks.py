@@ -3,7 +3,6 @@ docs/multi-tick-actions.md says."""
 
 from __future__ import annotations
 
-import os
 import random
 from collections.abc import Callable, Hashable
 
@@ -11,12 +10,13 @@ import pytest
 
 from bbtc.replay.script import Values
 from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import Running, expected_ticks, value_of
 from tests.replay.ticks import TickWorld, random_script
 
-TREES = 2000 if os.environ.get("BBTC_LONG") else 200
+TREES = amount(200, 2000)
 SCRIPTS = 5
 TICKS = 20
 """Ticks of a script; most trees end sooner."""

@@ -6,7 +6,6 @@ The files are those of the corpus that parse; continuous integration takes each 
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError, Report
@@ -16,8 +15,9 @@ from bbtc.syntax.layout import WIDTH
 from bbtc.syntax.parser import parse
 from bbtc.syntax.printer import print_document
 from bbtc.syntax.reader import read_source
+from tests.long_form import amount
 
-EVERY = 1 if os.environ.get("BBTC_LONG") else 20
+EVERY = amount(20, 1)
 
 
 def test_layout_keeps_trees_and_comments_and_is_stable(corpus: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 
 from hypothesis import HealthCheck, given, settings
@@ -13,10 +12,11 @@ from bbtc.source import SourceFile
 from bbtc.syntax import ast
 from bbtc.syntax.parser import parse
 from bbtc.syntax.printer import print_document
+from tests.long_form import amount
 from tests.syntax.trees import documents
 
 SLOW = settings(
-    max_examples=600 if os.environ.get("BBTC_LONG") else 60,
+    max_examples=amount(60, 600),
     deadline=None,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )

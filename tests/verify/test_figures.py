@@ -3,7 +3,6 @@ chain; those of trees that others wrote are refused."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -25,11 +24,11 @@ from bbtc.verify.program import Program
 from bbtc.verify.solve import Recomputed, recompute
 from bbtc.verify.verdict import verify
 from tests.conftest import GOLDEN
+from tests.long_form import amount
 from tests.plan.test_refine import action, task
 from tests.replay.random_trees import random_tree
 from tests.strategies import soda_tree, trees
 
-LONG = "BBTC_LONG" in os.environ
 SAME = (
     "success",
     "failure",
@@ -61,7 +60,7 @@ def disagreements(tree: Tree, found: Recomputed) -> dict[str, tuple[Fraction | N
 # --- random trees ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("first", range(0, 5000 if LONG else 250, 50))
+@pytest.mark.parametrize("first", range(0, amount(250, 5000), 50))
 def test_random_trees_full_of_actions(first: int) -> None:
     for seed in range(first, first + 50):
         tree = random_tree(seed, latched=0.85 if seed % 2 else 0.5)
@@ -70,7 +69,7 @@ def test_random_trees_full_of_actions(first: int) -> None:
             assert disagreements(tree, found) == {}, (seed, form, most)
 
 
-@settings(max_examples=3000 if LONG else 150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=amount(150, 3000), deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=trees())
 def test_trees_on_tasks_with_every_construct(tree: Tree) -> None:
     """Chance in chance, several factors, conditional effects, costs and rewards of outcomes."""

@@ -28,10 +28,11 @@ from bbtc.verify.optimum import best_probability
 from bbtc.verify.prism import prism_text
 from bbtc.verify.process import process_of
 from bbtc.verify.verdict import TOLERANCE, verify
+from tests.long_form import amount
 from tests.plan.examples import Optimum, cases
 from tests.replay.random_trees import random_tree
 from tests.strategies import HOSTILE_NAMES, soda_tree, tasks, trees
-from tests.verify.test_figures import FORMS, LONG
+from tests.verify.test_figures import FORMS
 
 pytest.importorskip("stormpy", reason="Storm is not installed: pip install 'bbtc[storm]'")
 
@@ -65,7 +66,7 @@ def expected(tree: Tree) -> list[Fraction | None]:
 # --- trees -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("first", range(0, 1000 if LONG else 100, 25))
+@pytest.mark.parametrize("first", range(0, amount(100, 1000), 25))
 def test_random_trees_full_of_actions(first: int) -> None:
     for seed in range(first, first + 25):
         tree = random_tree(seed, latched=0.85 if seed % 2 else 0.5)
@@ -74,7 +75,7 @@ def test_random_trees_full_of_actions(first: int) -> None:
         assert ask(prism_text(program, numbered(program)), TREE) == expected(tree), (seed, form, most)
 
 
-@settings(max_examples=1000 if LONG else 40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=amount(40, 1000), deadline=None, suppress_health_check=list(HealthCheck))
 @given(tree=trees(HOSTILE_NAMES))
 def test_exports_with_hostile_names_are_read_and_mean_the_same(tree: Tree) -> None:
     figures = simulate(tree.task, tree.root, Limits())
@@ -138,7 +139,7 @@ def test_the_listed_values_of_the_cases(case: Optimum) -> None:
     assert ask(prism_task(task), TASK) == [best]
 
 
-@settings(max_examples=2000 if LONG else 100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=amount(100, 2000), deadline=None, suppress_health_check=list(HealthCheck))
 @given(task=tasks())
 def test_the_best_that_any_policy_can_do(task: Task) -> None:
     """Bounds of the planner, our own policy iteration and Storm, which know nothing of one another."""
