@@ -205,7 +205,7 @@ def run(tree: Source | Tree | Plan, *, seed: int = 0, limits: Limits | None = No
     from bbtc.belief.stepper import Stepper
 
     planned = _tree(tree, limits)
-    stepper = Stepper(planned.task, planned.root, seed)
+    stepper = Stepper(planned.task, planned.root, seed, limits or Limits())
     stepper.start()
     return stepper
 

@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 from bbtc.ground.condition import compile_condition
 from bbtc.ground.task import Effect, Factor, GroundAction, Task
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 
 Values: TypeAlias = bytes
 """The truth value of every variable of the task, by index."""
@@ -49,16 +50,39 @@ _Delta: TypeAlias = tuple[tuple[int, int], ...]
 _Draw: TypeAlias = tuple[_Delta, Fraction, Fraction]  # sets, cost, reward
 
 
-def compile_action(action: GroundAction) -> Transition:
+_LOOK = 4096  # combinations of outcomes between two looks at the clock
+
+
+class _Bounded:
+    """Ends the multiplication of outcomes: n independent draws may have 2 to the n results."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._work = 0
+
+    def spend(self, work: int, found: int) -> None:
+        """So many combinations were formed, and so many of them differ."""
+        self._work += work
+        if found > self._limits.states:
+            self._limits.check_states(found, "working out what an action leads to")
+        if self._work > _LOOK:
+            self._work = 0
+            self._limits.check_time("working out what an action leads to")
+
+
+def compile_action(action: GroundAction, limits: Limits) -> Transition:
     """The action as a function from values to its results: equal results merged, most probable
-    first (ties by values). Results are cached per assignment."""
-    drawers = [_compile_factor(factor) for factor in action.factors]
+    first (ties by values). Results are cached per assignment. The function raises
+    :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on states, or
+    for longer than time and memory allow."""
+    bounded = _Bounded(limits)
+    drawers = [_compile_factor(factor, bounded) for factor in action.factors]
     cache: dict[Values, tuple[Result, ...]] = {}
 
     def results(values: Values) -> tuple[Result, ...]:
         known = cache.get(values)
         if known is None:
-            known = cache[values] = _results(values, action.cost, _product(values, drawers))
+            known = cache[values] = _results(values, action.cost, _product(values, drawers, bounded))
         return known
 
     return results
@@ -81,7 +105,7 @@ def _results(values: Values, cost: Fraction, draws: dict[_Draw, Fraction]) -> tu
 _Drawer: TypeAlias = Callable[[Values], dict[_Draw, Fraction]]
 
 
-def _product(values: Values, drawers: Iterable[_Drawer]) -> dict[_Draw, Fraction]:
+def _product(values: Values, drawers: Iterable[_Drawer], bounded: _Bounded) -> dict[_Draw, Fraction]:
     """Independent draws combined: sets united (the Kleene maximum where they clash), costs and
     rewards added, equal combinations merged at once so that only distinct results multiply."""
     total: dict[_Draw, Fraction] = {((), Fraction(0), Fraction(0)): Fraction(1)}
@@ -92,6 +116,7 @@ def _product(values: Values, drawers: Iterable[_Drawer]) -> dict[_Draw, Fraction
             for (delta2, cost2, reward2), p2 in drawn.items():
                 key = (_unite(delta, delta2), cost + cost2, reward + reward2)
                 combined[key] = combined.get(key, Fraction(0)) + p * p2
+            bounded.spend(len(drawn), len(combined))
         total = combined
     return total
 
@@ -105,14 +130,14 @@ def _unite(first: _Delta, second: _Delta) -> _Delta:
     return tuple(sorted(united.items()))
 
 
-def _compile_factor(factor: Factor) -> _Drawer:
+def _compile_factor(factor: Factor, bounded: _Bounded) -> _Drawer:
     outcomes = [
         (
             o.probability,
             o.cost,
             o.reward,
             _compile_effects(o.effects),
-            [_compile_factor(f) for f in o.factors],
+            [_compile_factor(f, bounded) for f in o.factors],
         )
         for o in factor.outcomes
     ]
@@ -121,9 +146,11 @@ def _compile_factor(factor: Factor) -> _Drawer:
         drawn: dict[_Draw, Fraction] = {}
         for probability, cost, reward, effects, nested in outcomes:
             delta = effects(values)
-            for (delta2, cost2, reward2), p in _product(values, nested).items():
+            product = _product(values, nested, bounded)
+            for (delta2, cost2, reward2), p in product.items():
                 key = (_unite(delta, delta2), cost + cost2, reward + reward2)
                 drawn[key] = drawn.get(key, Fraction(0)) + probability * p
+            bounded.spend(len(product), len(drawn))
         return drawn
 
     return draw

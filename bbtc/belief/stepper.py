@@ -10,6 +10,7 @@ from fractions import Fraction
 from bbtc.belief.state import State, Transition, Values, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, Status, Tick, compile_tick, memory_of
 from bbtc.ground.task import Task
+from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, Node, actions_of
 
 
@@ -39,12 +40,14 @@ class Stepper:
     """A run that can be taken on, outcome by outcome, and back.
 
     Drawn outcomes depend on the seed and on the number of the step alone, so that going back and on
-    again draws what was drawn before.
+    again draws what was drawn before. A step raises :class:`bbtc.diagnostics.LimitReached` where an
+    action has too many outcomes for the limits.
     """
 
     task: Task
     root: Node
     seed: int = 0
+    limits: Limits = field(default_factory=Limits)
     moments: list[Moment] = field(default_factory=list, init=False)
     _transitions: dict[str, Transition] = field(default_factory=dict, init=False)
     _statuses: dict[str, Status] = field(default_factory=dict, init=False)
@@ -112,7 +115,8 @@ class Stepper:
             return Moment(state, statuses, Status(returned), None, ())
         action = self._actions[returned - STARTED]
         if action.action not in self._transitions:
-            self._transitions[action.action] = compile_action(self.task.action_by_name[action.action])
+            ground = self.task.action_by_name[action.action]
+            self._transitions[action.action] = compile_action(ground, self.limits)
         merged: dict[Values, Fraction] = {}
         for result in self._transitions[action.action](state.values):
             merged[result.values] = merged.get(result.values, Fraction(0)) + result.probability

@@ -64,7 +64,7 @@ def command(
     from bbtc.cli.inputs import tree_of
 
     loaded = tree_of(session.read(tree))
-    stepper = Stepper(loaded.task, loaded.root, seed)
+    stepper = Stepper(loaded.task, loaded.root, seed, session.limits)
     taken = _Taken(outcomes)
     stepper.start(taken.next(stepper.starts) if len(stepper.starts) > 1 else None)
     if not batch and sys.stdin.isatty() and sys.stdout.isatty():

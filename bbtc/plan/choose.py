@@ -14,6 +14,7 @@ from bbtc.belief.state import State, Transition, Values, compile_action
 from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
 from bbtc.ground.task import GroundAction, Task, effects_of
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.plan.draft import Doing, Subgoal, changed_by
 from bbtc.plan.relaxed import RelaxedReachability, helpful, possible
 
@@ -75,9 +76,10 @@ class Candidate:
 class Chooser:
     """Finds the candidates for a target; everything that depends on the task only is indexed once."""
 
-    def __init__(self, task: Task, transitions: dict[str, Transition]) -> None:
+    def __init__(self, task: Task, transitions: dict[str, Transition], limits: Limits) -> None:
         self.task = task
         self.transitions = transitions
+        self.limits = limits
         self.reachability = RelaxedReachability(task)
         self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
@@ -189,7 +191,7 @@ class Chooser:
                 action = doing
             else:
                 action = GroundAction(doing.template, doing.args, doing.precondition, doing.factors)
-            store[doing.name] = compile_action(action)
+            store[doing.name] = compile_action(action, self.limits)
         return store[doing.name]
 
     def _parts(self, target: Target) -> Iterator[Candidate]:

@@ -77,7 +77,7 @@ def search_bounds(task: Task, limits: Limits, target: Fraction | None = None) ->
 class _Search:
     def __init__(self, task: Task, limits: Limits, target: Fraction | None) -> None:
         self.limits, self.target = limits, target
-        self.explorer = Explorer(task)
+        self.explorer = Explorer(task, limits)
         self.heuristic = Heuristic(task, self.explorer.packing)
         self.probability = np.empty(0)
         self.guess: Costs = np.empty(0, dtype=np.float32)

@@ -148,7 +148,7 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
     simulation of the initial belief.
     """
     transitions: dict[str, Transition] = {}
-    finder = TargetFinder(task, Chooser(task, transitions))
+    finder = TargetFinder(task, Chooser(task, transitions, limits))
     refiner = _Refiner(task, target, limits, Draft.start(task), transitions, finder)
     refinements: list[Refinement] = []
     status: PlanStatus = "stuck"

@@ -99,10 +99,10 @@ class Choices(NamedTuple):
 class Explorer:
     """A state space while it grows from the initial belief of a task."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, limits: Limits) -> None:
         self.task = task
         self.packing = Packing.of(task)
-        self.tables = ActionTables(task, self.packing)
+        self.tables = ActionTables(task, self.packing, limits)
         self.table = StateTable(self.packing.words)
         self._goal_test: BitTest = bit_test(self.packing, task.goal)
         self._goal = _Column(np.bool_)
@@ -263,7 +263,7 @@ def explore_space(task: Task, limits: Limits, depth: int | None = None) -> State
 
     Never raises for a limit: the space then has unexpanded states and says what stopped it.
     """
-    explorer = Explorer(task)
+    explorer = Explorer(task, limits)
     stop: Diagnostic | None = None
     levels = [0]
     done = 0

@@ -14,6 +14,7 @@ from bbtc.belief.state import Transition, compile_action
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Effect, Factor, Task
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.plan.space_packing import WORD, BitTest, Cube, Flags, Packing, Words, bit_test, cubes, holds
 
 Index: TypeAlias = npt.NDArray[np.int64]
@@ -66,6 +67,7 @@ class ActionTables:
 
     task: Task
     packing: Packing
+    limits: Limits
     draws: list[Draw] = field(default_factory=list)
 
     # Applicability: rows of cubes, ordered by action; other preconditions one by one.
@@ -130,7 +132,7 @@ class ActionTables:
             joint = _joint(action.factors)
             rows = None if joint is None else [self._outcome(effects) for effects, _, _ in joint]
             if joint is None or rows is None or any(row is None for row in rows):
-                self.by_reference[number] = compile_action(action)
+                self.by_reference[number] = compile_action(action, self.limits)
                 count.append(0)
                 continue
             for row, ((_, cost, reward), probability) in zip(rows, joint.items(), strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import resource
 import subprocess
 import sys
@@ -105,3 +106,50 @@ def test_twelve_parameters_that_few_objects_fit(tmp_path: Path) -> None:
     file = _wide(tmp_path / "wide.pddl", 12, 1, "(and {})")
     done = _run("compile", str(file), "-o", str(tmp_path / "task.json"))
     assert done.returncode == 0
+
+
+def _draws(path: Path, count: int) -> Path:
+    """An action of so many independent draws: two to that power outcomes."""
+    facts = " ".join(f"(p{n})" for n in range(count))
+    draws = " ".join(f"(probabilistic 1/2 (p{n}))" for n in range(count))
+    path.write_text(
+        f"(define (domain draws) (:predicates {facts}) (:action all :effect (and {draws})))"
+        f"(define (problem p) (:domain draws) (:init) (:goal (and {facts})))"
+    )
+    return path
+
+
+@pytest.fixture
+def drawing(tmp_path: Path) -> Path:
+    """A tree whose one action has two to the fortieth outcomes."""
+    task = tmp_path / "task.json"
+    assert _run("compile", str(_draws(tmp_path / "draws.pddl", 40)), "-o", str(task)).returncode == 0
+    compiled = json.loads(task.read_text())
+    root = {"id": "n1", "type": "action", "action": "all()", "latched": True}
+    tree = {
+        "format": "bbtc-tree", "version": 1, "domain": "draws", "problem": "p",
+        "success_probability": "0", "target": "1", "status": "stuck", "root": root, "task": compiled,
+    }  # fmt: skip
+    file = tmp_path / "tree.json"
+    file.write_text(json.dumps(tree))
+    return file
+
+
+@pytest.mark.parametrize("strategy", ["auto", "refine", "policy", "search"])
+def test_an_action_of_very_many_outcomes_ends_planning_at_the_limit(tmp_path: Path, strategy: str) -> None:
+    file = _draws(tmp_path / "draws.pddl", 40)
+    done = _run("plan", str(file), "--strategy", strategy, "--time-limit", "2", "-o", str(tmp_path / "t"))
+    assert done.returncode == 3
+    assert (tmp_path / "t").exists()
+
+
+@pytest.mark.parametrize(
+    "command", [["simulate"], ["run", "--batch"], ["export", "--to", "dot", "-O", "flow=true"]]
+)
+@pytest.mark.parametrize("limit", ["--time-limit=2", "--max-states=1000"])
+def test_an_action_of_very_many_outcomes_ends_at_the_limit(
+    drawing: Path, command: list[str], limit: str
+) -> None:
+    done = _run(command[0], str(drawing), *command[1:], limit)
+    assert done.returncode == 3
+    assert f"raise it with {limit.partition('=')[0]}" in done.stderr

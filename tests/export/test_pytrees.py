@@ -24,6 +24,7 @@ from bbtc.export.pytrees_runtime import MODULES, used_in
 from bbtc.export.registry import load_exporter, parse_options
 from bbtc.export.shape import DEEPEST_TREE
 from bbtc.ground.task import Task
+from bbtc.limits import Limits
 from bbtc.replay.engines import PyTreesReplay
 from bbtc.replay.script import Run, Script
 from bbtc.tree.nodes import Tree, actions_of
@@ -310,6 +311,6 @@ def test_the_simulated_world_has_exactly_the_distribution_of_the_task(seed: int)
             return tuple(TRUTH[(state | changes)[fact]] for fact in facts)
 
         wanted: dict[tuple[int, ...], Fraction] = {}
-        for result in compile_action(action)(bytes(before)):
+        for result in compile_action(action, Limits())(bytes(before)):
             wanted[tuple(result.values)] = wanted.get(tuple(result.values), Fraction(0)) + result.probability
         assert distribution(after) == wanted
