@@ -35,6 +35,8 @@ def write(path: str, content: str | bytes, *, check: bool = False, scratch: str 
         old = Path(path).read_bytes()
     except FileNotFoundError:
         old = None
+    except IsADirectoryError:
+        raise BbtcError.single("BBT0004", f"cannot write {path}: it is a directory") from None
     except OSError as error:
         raise BbtcError.single("BBT0004", f"cannot read {path}: {error.strerror}") from error
     if old == data:
@@ -43,6 +45,30 @@ def write(path: str, content: str | bytes, *, check: bool = False, scratch: str 
         raise drift(path, old, data)
     _replace(path, data, scratch)
     return True
+
+
+def require_writable(path: str, *, folder: bool = False) -> None:
+    """Raise :class:`BbtcError` now where it is plain that :func:`write` (with ``folder``
+    :func:`write_files`) could not write to ``path``: before long work, whose result would be lost."""
+    if path == "-":
+        return
+    target = Path(os.path.realpath(path))
+    if folder:
+        _refuse(path, target.exists() and not target.is_dir(), "it is not a directory")
+        while not target.exists():  # what is missing is made
+            target = target.parent
+    else:
+        _refuse(path, target.is_dir(), "it is a directory")
+        if target.exists():
+            return  # it may have the wanted content already
+        target = target.parent
+        _refuse(path, not target.is_dir(), f"there is no folder {Path(path).parent}")
+    _refuse(path, not os.access(target, os.W_OK | os.X_OK), "permission denied")
+
+
+def _refuse(path: str, wrong: bool, why: str) -> None:
+    if wrong:
+        raise BbtcError.single("BBT0004", f"cannot write {path}: {why}")
 
 
 def _is_special(path: str) -> bool:
@@ -68,8 +94,7 @@ def write_files(directory: str, texts: Mapping[str, str], *, check: bool = False
     missing; other files in it stay. With ``check`` nothing is written, and the first difference
     raises. Raises :class:`BbtcError` as :func:`write` does, and where ``directory`` is not one."""
     root = Path(directory)
-    if root.exists() and not root.is_dir():
-        raise BbtcError.single("BBT0004", f"cannot write {directory}: it is not a directory")
+    _refuse(directory, root.exists() and not root.is_dir(), "it is not a directory")
     for name, text in texts.items():
         target = root.joinpath(*name.split("/"))
         if not check:

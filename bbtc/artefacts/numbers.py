@@ -72,7 +72,9 @@ def parse_probability(text: str) -> Fraction:
     Raises ``ValueError`` for any other text and for a value outside [0, 1]."""
     number = parse_written(text, "a probability such as 0.9, 9/10 or 90%")
     if not 0 <= number <= 1:
-        raise ValueError(f"{text[:40]} is not between 0 and 1")
+        meant = "%" not in text and 2 <= number <= 100
+        hint = f"; write {text[:40]}% for a percentage" if meant else ""
+        raise ValueError(f"{text[:40]} is not between 0 and 1{hint}")
     return number
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping
 from fractions import Fraction
 
 import click
@@ -70,8 +72,12 @@ def command(
     from bbtc.cli.inputs import is_artefact, is_tree, task_of, tree_of
     from bbtc.cli.plan import STATUS_EXIT, run_planner
     from bbtc.pipeline import export_tree
+    from bbtc.plan.options import DEFAULTS
+    from bbtc.plan.strategies import require_strategy
 
-    require_place(form, output)
+    pairs = dict(_pair(option) for option in options)
+    require_place(session, form, pairs, output, check=check)
+    require_strategy(strategy, DEFAULTS)
     limits = session.limits
     sources = [session.read(file) for file in files]
     status = 0
@@ -82,18 +88,25 @@ def command(
         tree, status = plan.tree, STATUS_EXIT[plan.tree.status]
     if verified:
         require_verified(session, tree)
-    pairs = dict(_pair(option) for option in options)
     artefact = export_tree(tree, form, pairs, limits)
     session.write(output, artefact, check=check, depfile=depfile)
     return status
 
 
-def require_place(form: str, output: str) -> None:
-    """Refuse, before any work, an unknown format, and to write several files to stdout."""
-    from bbtc.export.registry import load_exporter
+def require_place(
+    session: Session, form: str, options: Mapping[str, str], output: str, *, check: bool
+) -> None:
+    """Refuse, before any work, an unknown format or option, a place that cannot be written to,
+    several files on stdout, and pixels on a terminal."""
+    from bbtc.export.registry import load_exporter, parse_options
 
-    if not load_exporter(form).suffix and output == "-":
+    exporter = load_exporter(form)
+    parse_options(exporter, options)
+    if output == "-" and not exporter.suffix:
         raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
+    if output == "-" and form == "png" and sys.stdout.isatty():
+        raise click.UsageError("The format 'png' is no text: name a file with -o.")
+    session.expect_output(output, folder=not exporter.suffix, check=check)
 
 
 def _pair(option: str) -> tuple[str, str]:

@@ -54,7 +54,7 @@ STATUS_EXIT: dict[Status, int] = {
     type=click.Choice(["least", "unbounded"]),
     default="least",
     show_default=True,
-    help="Try again as often as the target takes, or without end (policy, auto).",
+    help="Try again as often as the target takes, or without end (search, policy, auto).",
 )
 @click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
 @click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
@@ -89,13 +89,16 @@ def command(
     """
     from bbtc import artefacts
     from bbtc.cli.inputs import load_task
-    from bbtc.plan.options import Options
+    from bbtc.plan.options import DEFAULTS, Options
+    from bbtc.plan.strategies import require_strategy
 
     if as_json and not bounds:
         raise click.UsageError("--json goes with --bounds: a tree is always written as JSON.")
     limits = session.limits
-    task = load_task(session, files, limits)
     options = Options(max_actions=max_actions, retries=retries)
+    require_strategy(strategy, options if not bounds else DEFAULTS)
+    session.expect_output(output, check=check)
+    task = load_task(session, files, limits)
     if bounds:
         wanted = task.goal_probability if target is None else target
         return _print_bounds(session, task, wanted, options, output, as_json=as_json)

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, cast
 
 import click
 
-from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT
+from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
-from bbtc.files import write, write_depfile, write_files
+from bbtc.files import require_writable, write, write_depfile, write_files
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 
@@ -58,6 +58,11 @@ class Session:
         self.inputs.append(path)
         return read_source(path, self.limits.file_bytes)
 
+    def expect_output(self, output: str, *, folder: bool = False, check: bool = False) -> None:
+        """Refuse, before any work, a place that :meth:`write` could not write to."""
+        if not check:
+            require_writable(output, folder=folder)
+
     def write(self, output: str, artefact: Artefact, *, check: bool, depfile: str | None) -> None:
         """Write what a command made, as ``-o``, ``--check`` and ``--depfile`` ask."""
         self.clear()
@@ -77,11 +82,18 @@ class Session:
             click.echo(text, err=True, nl=False, color=color)
 
 
+# What is wrong with the command line itself: a strategy, a format or an option of theirs.
+_WRONG_USAGE = frozenset({"BBT0501", "BBT0503", "BBT0701", "BBT0704"})
+
+
 def _fail(session: Session, error: BbtcError) -> NoReturn:
     shown = [*session.report]
     shown.extend(d for d in error.diagnostics if d not in shown)
     session.show(shown)
-    sys.exit(EXIT_LIMIT if isinstance(error, LimitReached) else EXIT_ERRORS)
+    if isinstance(error, LimitReached):
+        sys.exit(EXIT_LIMIT)
+    usage = all(each.code in _WRONG_USAGE for each in error.diagnostics)
+    sys.exit(EXIT_USAGE if usage else EXIT_ERRORS)
 
 
 def command(function: Callable[..., int | None]) -> Callable[..., None]:

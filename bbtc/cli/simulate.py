@@ -44,6 +44,7 @@ def command(
     from bbtc.cli.wording import figures_report
     from bbtc.pipeline import simulate_tree
 
+    session.expect_output(output)
     loaded = tree_of(session.read(tree))
     limits = session.limits
     figures, chain = simulate_tree(loaded, limits)

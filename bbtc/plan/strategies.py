@@ -23,23 +23,27 @@ STRATEGIES = {
 DEFAULT = "advised"
 
 
-def run_strategy(
-    name: str, task: Task, target: Fraction, *, limits: Limits, progress: Progress, options: Options
-) -> Plan:
-    """Plan with a strategy. Raises :class:`BbtcError` for an unknown one, and for options that it
-    does not know."""
+def require_strategy(name: str, options: Options) -> None:
+    """Raises :class:`BbtcError` for an unknown strategy, and for options that it does not know."""
     if name not in STRATEGIES:
         raise BbtcError.single(
             "BBT0501", f"unknown strategy '{name}'", hint=f"known: {', '.join(STRATEGIES)}"
         )
-    module, function = STRATEGIES[name]
-    strategy: Strategy = getattr(import_module(module), function)
     if name in {"refine", "search"} and options.max_actions is not None:
         raise BbtcError.single(
             "BBT0503",
             f"the strategy '{name}' does not plan within a number of actions",
             hint="use --strategy policy",
         )
+
+
+def run_strategy(
+    name: str, task: Task, target: Fraction, *, limits: Limits, progress: Progress, options: Options
+) -> Plan:
+    """Plan with a strategy. Raises :class:`BbtcError` as :func:`require_strategy` does."""
+    require_strategy(name, options)
+    module, function = STRATEGIES[name]
+    strategy: Strategy = getattr(import_module(module), function)
     if name == "refine":
         return strategy(task, target, limits, progress)
     return strategy(task, target, limits, progress, options)

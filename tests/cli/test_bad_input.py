@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -217,6 +218,12 @@ def test_errors_of_one_run_are_all_reported(folder: Path) -> None:
         ["plan", "domain.pddl", "--no-such-option"],
         ["export", "domain.pddl"],
         ["frobnicate"],
+        ["plan", "no-such-file", "--strategy", "searhc"],
+        ["plan", "no-such-file", "--strategy", "refine", "--max-actions", "3"],
+        ["export", "no-such-file", "--to", "svgg"],
+        ["export", "no-such-file", "--to", "dot", "-O", "size=1"],
+        ["export", "no-such-file", "--to", "dot", "-O", "legend=maybe"],
+        ["import", "no-such-file", "--to", "svgg"],
     ],
 )
 def test_wrong_usage_is_status_2(folder: Path, arguments: list[str]) -> None:
@@ -270,6 +277,39 @@ def test_diagnostics_for_machines(folder: Path, form: str) -> None:
 def test_an_output_that_cannot_be_written_is_an_error(folder: Path) -> None:
     done = bbtc("compile", "domain.pddl", "problem.pddl", "-o", "missing/task.json", folder=folder)
     assert_refused(done, folder, "missing/task.json")
+
+
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [("missing/x.json", "there is no folder missing"), ("sub", "it is a directory"), ("locked/x", "denied")],
+)
+@pytest.mark.parametrize(
+    "command",
+    [["compile"], ["plan"], ["plan", "--bounds"], ["export", "--to", "dot"], ["simulate"], ["import"]],
+)
+def test_a_place_that_cannot_be_written_to_is_told_before_any_work(
+    folder: Path, command: list[str], place: str, why: str
+) -> None:
+    (folder / "sub").mkdir()
+    (folder / "locked").mkdir(mode=0o555)
+    if place == "locked/x" and os.access(folder / "locked", os.W_OK):
+        pytest.skip("this user may write everywhere")
+    done = bbtc(*command, "no-such-file", "-o", place, folder=folder)
+    assert "no-such-file" not in assert_refused(done, folder, f"cannot write {place}", why)
+
+
+def test_an_unchanged_file_in_a_folder_that_may_not_be_written_to_is_no_error(folder: Path) -> None:
+    (folder / "sub").mkdir()
+    compiled = ["compile", "domain.pddl", "problem.pddl", "-o", "sub/task.json"]
+    assert bbtc(*compiled, folder=folder).returncode == 0
+    (folder / "sub").chmod(0o555)
+    assert bbtc(*compiled, folder=folder).returncode == 0
+    (folder / "sub").chmod(0o755)
+
+
+def test_a_percentage_that_looks_like_a_probability_is_told_how_to_write_it(folder: Path) -> None:
+    done = bbtc("plan", "domain.pddl", "--target", "95", folder=folder)
+    assert "95 is not between 0 and 1; write 95% for a percentage" in done.stderr
 
 
 @pytest.mark.parametrize(
