@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from typing_extensions import assert_never
 
-from bbtc.analysis.names import Names, Scope
+from bbtc.analysis.names import TRUTH_WORDS, Names, Scope, nearest
 from bbtc.diagnostics import Related
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -66,7 +66,7 @@ def _predicate_args(
 ) -> tuple[mf.Term, ...] | None:
     predicate = names.predicate(name, args)
     if predicate is None:
-        for arg in args:
+        for arg in args if name.key not in TRUTH_WORDS else ():
             names.term(arg, scope)
         return None
     return names.arguments("predicate", name, predicate, args, scope, span=span)
@@ -166,7 +166,7 @@ def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Cho
                 "BBT0210",
                 f"probability {branch.probability.text} is outside [0, 1]",
                 branch.probability.span,
-                f"if this is a percentage, write {_decimal(value / 100)}" if 2 <= value <= 100 else None,
+                percentage(value),
             )
             faulty = True
         drawn.append((value, effect(names, branch.effect, scope), branch))
@@ -188,6 +188,11 @@ def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Cho
     return me.Choice(tuple(branches), False, node.span)
 
 
+def percentage(value: Fraction) -> str | None:
+    """The hint about a probability that is too large, if it seems to be a percentage."""
+    return f"if this is a percentage, write {_decimal(value / 100)}" if 2 <= value <= 100 else None
+
+
 def _decimal(value: Fraction) -> str:
     return f"{float(value):.12g}"
 
@@ -196,11 +201,14 @@ def _fluent_effect(names: Names, node: ast.FluentEffect, scope: Scope) -> me.Eff
     key = node.fluent.name.key
     to = "cost" if key in names.costs else "reward" if key in names.rewards else None
     if to is None or node.fluent.args or node.operator not in ("increase", "decrease"):
+        near = nearest(key, sorted(names.costs | names.rewards)) if to is None else None
         names.report.error(
             "BBT0212",
             f"the numeric effect `{node.operator} {node.fluent.name.text}` is not supported",
             node.span,
-            "numbers are read as costs and rewards: `increase` or `decrease` of the fluent that the "
+            f"did you mean `{near}`?"
+            if near is not None
+            else "numbers are read as costs and rewards: `increase` or `decrease` of the fluent that the "
             "metric names, `total-cost` or `reward`",
         )
         return me.NOTHING

@@ -17,6 +17,8 @@ from bbtc.source import Span
 from bbtc.syntax import ast
 
 Scope = Mapping[str, Parameter]
+TRUTH_WORDS = frozenset({"known", "unknown"})
+"""Words that stand before a fact in parentheses."""
 _NO_TYPE = ""
 """Stands for a type that is not known, which has been reported: it fits everything."""
 _TOLD = 10
@@ -86,12 +88,18 @@ class Names:
     _told_in_sum: dict[str, ast.Term] = field(default_factory=dict)
     _uses: Uses | None = None
 
-    def unknown(self, code: str, kind: str, name: ast.Term, known: Mapping[str, Declared]) -> None:
-        """Report a name that nothing declares, with the nearest one that is."""
+    def unknown(
+        self, code: str, kind: str, name: ast.Term, known: Mapping[str, Declared], meant: str | None = None
+    ) -> None:
+        """Report a name that nothing declares, with what is ``meant`` where that is plain, else with the
+        nearest name that is declared."""
         key = name.key
         if (self.section, kind, key) in self._told:
             return
         self._told.add((self.section, kind, key))
+        if meant is not None:
+            self.report.error(code, f"unknown {kind} `{name.text}`", name.span, meant)
+            return
         near = None
         if self._compares(known):
             near = slip(key, known) or nearest(key, known)
@@ -181,6 +189,10 @@ class Names:
         if found is not None:
             return found
         known = self._declared("predicate", self.predicates)
+        meant = self._no_predicate(key, args)
+        if meant is not None:
+            self.unknown("BBT0202", "predicate", name, known, meant)
+            return None
         near, alone = self._slip("predicate", key, known, len(args)), self._stands_alone(key)
         if (alone and (near is not None or key not in self.uses.given)) or key in self.hierarchy.types:
             self.unknown("BBT0202", "predicate", name, known)
@@ -191,6 +203,15 @@ class Names:
         where = f"with {_count(len(args))}" if args else "without arguments"
         self._infer("predicate", name, f"it is taken as a predicate {where}", near)
         return self.predicates[key]
+
+    def _no_predicate(self, key: str, args: Sequence[ast.Term]) -> str | None:
+        """What is meant by a name that has the place of a predicate and is a function, or a word of the
+        language that lacks the parentheses within."""
+        if key in TRUTH_WORDS and args:
+            return f"write `({key} ({' '.join(arg.text for arg in args[:8])}))`"
+        if key in self.functions:
+            return f"`{key}` is a function, whose values are numbers: `(= ({key}{' …' if args else ''}) 1)`"
+        return None
 
     def _inferred_object(self, name: ast.Name, types: tuple[str, ...]) -> bool:
         """Take a name that actions use as a constant of the type that its place has. In a problem, where the
@@ -292,6 +313,10 @@ class Names:
             self.unknown("BBT0204", "parameter", term, scope)
             return None
         if key not in self.objects or ("object", key) in self._inferred:
+            if f"?{key}" in scope:
+                meant = f"did you mean the parameter `?{term.text}`?"
+                self.unknown("BBT0203", "object", term, self.objects, meant)
+                return None
             self._inferred_object(term, wanted)
         thing = self.objects.get(key)
         if thing is not None:

@@ -310,6 +310,7 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
                 "BBT0214",
                 f"the goal probability {number.value.text} is outside (0, 1]",
                 number.value.span,
+                formulas.percentage(value),
             )
         else:
             probability = value

@@ -34,6 +34,8 @@ _KEYWORD = re.compile(r"(?:\\\(\\s\*)?(:?)(?:\(([a-z|-]+)\)|([a-z-]+))(?:\(\?=|\
 _TERM = re.compile(r"\s*\??[a-z0-9_][a-z0-9_.*+@#$%!~-]*", re.IGNORECASE)
 _ATOM_HEAD = re.compile(r"\(\s*([a-z0-9_][^\s()?]*)[^()]*\(", re.IGNORECASE)
 _NAME = re.compile(r"[a-z0-9_]", re.IGNORECASE)
+_PERCENTAGE = re.compile(r"(\d{1,9}(?:\.\d{1,9})?|\.\d{1,9})%", re.ASCII)
+_BARE_NOT = re.compile(r"\(\s*not\s+([^\s()]+(?:\s+[^\s()]+){1,8})\s*\)", re.IGNORECASE)
 
 # What may stand at a place, by the first terminal of the list that may.
 _SLOTS: tuple[tuple[str, str], ...] = (
@@ -156,7 +158,7 @@ def explain(place: Place) -> tuple[Fault, list[Form]]:
             return inner, forms
     shown = f"`{'(' + head if found.startswith('(') else found}`" if found else "the end of the file"
     message = f"expected {_expected(place.accepted, forms)}{_where(forms)}, found {shown}"
-    hint = _near(place, head or found) or _misplaced(place, (head or found).lower())
+    hint = _misplaced(place, (head or found).lower()) or _near(place, head or found)
     hint = hint or _joined(place, found, forms)
     return Fault("BBT0101", message, place.position, place.position + len(found), hint), forms
 
@@ -259,7 +261,15 @@ def _misplaced(place: Place, word: str) -> str | None:
 
 
 def _joined(place: Place, found: str, forms: list[Form]) -> str | None:
-    """Advice where one part is given too many, or a parameter lacks its question mark."""
+    """Advice where one part is given too many, or parentheses or a question mark are missing."""
+    percentage = _PERCENTAGE.fullmatch(found)
+    if "NUMBER" in place.accepted and percentage:
+        from decimal import Decimal
+
+        return f"write `{Decimal(percentage[1]).scaleb(-2).normalize():f}`"
+    bare = _BARE_NOT.match(place.text, forms[-1].start) if forms else None
+    if bare is not None and place.position < bare.end():
+        return f"write `(not ({' '.join(bare[1].split())}))`"
     if "VARIABLES" in place.accepted and _NAME.match(found):
         return f"parameters start with `?`: `?{found}`"
     if "HEAD" in place.accepted and _NAME.match(found):

@@ -1,0 +1,8 @@
+(define (domain lamps)
+  (:predicates (lit ?l) (broken ?l))
+  (:action light :parameters (?l)
+    :precondition (and (not lit ?l) (not (broken ?l)))
+    :effect (not broken ?l))
+  (:action try :parameters (?l) :effect (probabilistic 62.50% (lit ?l)))
+  (:action look :parameters (?l) :effect (known (lit ?l))))
+(define (problem p) (:domain lamps) (:goal (lit a)) (:goal-probability 100%))
