@@ -41,6 +41,7 @@ class Condition(Behaviour):
 
     def update(self) -> Status:
         value = self._read()
+        self.feedback_message = "unknown" if value is None else ""
         if value is None:
             return Status.RUNNING
         return Status.SUCCESS if value else Status.FAILURE
@@ -132,6 +133,7 @@ class Retry(Decorator):
         self.made = 0
 
     def update(self) -> Status:
+        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
         return self.decorated.status
 
 
@@ -227,6 +229,11 @@ class StopWhenBlocked(Decorator):
     def setup(self, **kwargs: Any) -> None:
         if isinstance(self._robot, WithSetup):
             self._robot.setup(**kwargs)
+
+    def shutdown(self) -> None:
+        # py_trees ends a tree with this alone, even where an action runs that nobody cancels.
+        if self.status == Status.RUNNING:
+            self.stop(Status.INVALID)
 
     def acts(self, latch: Latch) -> None:
         """A latch below is about to run its action in this tick."""

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bbtc.diagnostics import BbtcError
 from bbtc.export.names import module_name
 from bbtc.export.registry import load_exporter, parse_options
-from bbtc.runtime import Beliefs, Condition, Latch, StopWhenBlocked, run, sequence
+from bbtc.runtime import Beliefs, Condition, Latch, StopWhenBlocked, Try, retry, run, sequence, skipper
 from bbtc.tree.nodes import Tree
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
@@ -73,6 +73,34 @@ def test_an_exception_cancels_what_runs() -> None:
     with pytest.raises(KeyboardInterrupt):
         run(StopWhenBlocked(robot, sequence("all", Condition("read", read), latch)))
     assert robot.heard == [{}, "go", "cancel go"]
+
+
+def test_a_tree_that_is_shut_down_cancels_what_runs_in_it() -> None:
+    robot = Recorder()
+    tree = py_trees.trees.BehaviourTree(py_trees.decorators.Inverter("larger tree", robot.root()))
+    tree.setup()
+    tree.tick_tock(period_ms=1, number_of_iterations=2)
+    tree.interrupt()
+    assert robot.heard == [{}, "go", "go"]
+    tree.shutdown()
+    tree.shutdown()
+    assert robot.heard == [{}, "go", "go", "cancel go"]
+
+
+def test_a_snapshot_tells_what_is_unknown_and_how_many_attempts_were_made() -> None:
+    beliefs: list[bool | None] = [None]
+    robot = Recorder()
+    attempt = Try("go", robot.go, robot.cancel)  # type: ignore[arg-type]
+    root = StopWhenBlocked(
+        robot, retry("at most 3", 3, skipper("see", Condition("seen", lambda: beliefs[-1]), attempt))
+    )
+    root.tick_once()
+    shown = py_trees.display.unicode_tree(root, show_status=True)
+    assert "seen [*] -- unknown" in shown
+    assert "at most 3 [*] -- 1 of 3 attempts made" in shown
+    beliefs.append(True)
+    root.tick_once()
+    assert "unknown" not in py_trees.display.unicode_tree(root, show_status=True)
 
 
 def test_two_trees_in_one_leave_each_other_alone() -> None:
