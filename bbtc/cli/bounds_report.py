@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from bbtc.artefacts.numbers import figure_text
-from bbtc.cli.wording import counted, exact
+from bbtc.cli.wording import counted, exact, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -27,9 +27,6 @@ def best_possible(lower: Fraction, upper: Fraction) -> str:
 
 def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
     """The value of a task, as lines of text."""
-    within = ""
-    if value.max_actions is not None:
-        within = f" with at most {counted(value.max_actions, 'action')}"
     verdict = "undecided"
     if value.lower >= target:
         verdict = "can be reached"
@@ -37,7 +34,7 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
         verdict = "out of reach"
     lines = [
         f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}",
-        f"best success probability{within}: {best_possible(value.lower, value.upper)}",
+        f"best success probability{within(value.max_actions)}: {best_possible(value.lower, value.upper)}",
         f"target {exact(target)}: {verdict}",
     ]
     if value.cost is not None:
@@ -52,17 +49,22 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def bounds_lines(tree: Tree) -> list[str]:
-    """What any policy can reach, as far as the planner found out."""
+def bounds_lines(tree: Tree, max_actions: int | None = None) -> list[str]:
+    """What any policy can reach, within a number of actions, as far as the planner found out."""
     if tree.bounds is None:
         return []
-    return [f"the best that any policy can do is {best_possible(*tree.bounds)}"]
+    return [f"the best that any policy can do{within(max_actions)} is {best_possible(*tree.bounds)}"]
 
 
-def dead_end_lines(ends: Sequence[DeadEnd]) -> list[str]:
+def dead_end_lines(ends: Sequence[DeadEnd], max_actions: int | None = None) -> list[str]:
     """Why a target is out of reach: where runs end, the most probable first, with the line of the
-    action it is due to, and what that comes from."""
+    action it is due to, and what that comes from. Within a number of actions, those that lose no part of
+    the goal by itself have run out of actions, and are told in sum."""
     lines = []
+    late = sum((end.probability for end in ends if not end.lost), Fraction(0))
+    if max_actions is not None and late:
+        ends = [end for end in ends if end.lost]
+        lines.append(f"  {exact(late)}: too few of the {counted(max_actions, 'action')} are left")
     for end in ends[:_MOST_ENDS]:
         why = " and ".join(end.lost) or "the goal as a whole"
         when = "from the start" if end.action is None else f"after {end.action}{_at(end.span)}"

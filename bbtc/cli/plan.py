@@ -140,26 +140,26 @@ def run_planner(
 ) -> Plan:
     """Plan, telling the session each refinement as it is made and how planning ended."""
     from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
-    from bbtc.cli.wording import exact, plan_summary, refinement_line
+    from bbtc.cli.wording import exact, plan_summary, refinement_line, simplified_line
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
     from bbtc.plan.options import DEFAULTS
     from bbtc.plan.why_not import dead_ends
 
-    count = 0
+    options = options or DEFAULTS
+    told: list[Refinement] = []
 
     def tell(step: Refinement) -> None:
-        nonlocal count
-        count += 1
+        told.append(step)
         if not quiet:
-            for line in refinement_line(count, step):
+            for line in refinement_line(len(told), step):
                 session.say(line)
 
     if not quiet:
         wanted = task.goal_probability if target is None else target
         session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
     with _terminated_like_interrupted():
-        plan = plan_task(task, target, strategy, limits, tell, options=options or DEFAULTS)
+        plan = plan_task(task, target, strategy, limits, tell, options=options)
     if plan.tree.status == "stuck":
         session.report.warning(
             "BBT0502",
@@ -167,9 +167,11 @@ def run_planner(
             task.goal_span,
             hint="another strategy may reach it",
         )
-    for line in [*plan_summary(plan), *bounds_lines(plan.tree)]:
-        session.say(line)
-    for line in dead_end_lines(dead_ends(plan.tree, replace(limits, seconds=None))):
+    most = options.max_actions
+    ends = dead_ends(plan.tree, replace(limits, seconds=None))
+    made = simplified_line(told[-1], plan.tree) if told and not quiet else []
+    lines = [*made, *plan_summary(plan, most), *bounds_lines(plan.tree, most), *dead_end_lines(ends, most)]
+    for line in lines:
         session.say(line)
     return plan
 

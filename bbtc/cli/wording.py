@@ -12,7 +12,7 @@ from bbtc.export.names import printable
 from bbtc.ground.describe import describe
 from bbtc.kleene import Truth
 from bbtc.plan.result import Plan, Refinement
-from bbtc.tree.nodes import Tree, retries_of
+from bbtc.tree.nodes import Tree, retries_of, walk
 
 __all__ = [
     "changes",
@@ -21,6 +21,8 @@ __all__ = [
     "figures_report",
     "plan_summary",
     "refinement_line",
+    "simplified_line",
+    "within",
 ]
 
 
@@ -53,8 +55,20 @@ def refinement_line(number: int, step: Refinement) -> list[str]:
     return [f"{number:3d}. {why}", f"     {what}", f"     success {exact(step.success)}, {step.nodes} nodes"]
 
 
-def plan_summary(plan: Plan) -> list[str]:
-    """How planning ended, in words."""
+def simplified_line(last: Refinement, tree: Tree) -> list[str]:
+    """What was made of the tree after its last refinement, if anything was."""
+    nodes = sum(1 for _ in walk(tree.root))
+    if (nodes, tree.success_probability) == (last.nodes, last.success):
+        return []
+    bounded = ", with no more attempts than the target takes" if any(retries_of(tree.root)) else ""
+    return [
+        f"     then simplified{bounded}:",
+        f"     success {exact(tree.success_probability)}, {nodes} nodes",
+    ]
+
+
+def plan_summary(plan: Plan, max_actions: int | None = None) -> list[str]:
+    """How planning ended, in words; ``max_actions``: within that many actions."""
     tree = plan.tree
     reached = f"success probability {exact(tree.success_probability)}"
     wanted = exact(tree.target)
@@ -62,7 +76,8 @@ def plan_summary(plan: Plan) -> list[str]:
         case "target-reached":
             return [f"target {wanted} reached: {reached}"]
         case "out-of-reach":
-            return [f"target {wanted} is out of reach of any policy; the best tree has {reached}"]
+            policy = f"any policy{within(max_actions)}"
+            return [f"target {wanted} is out of reach of {policy}; the best tree has {reached}"]
         case "stuck":
             return [f"target {wanted} not reached: nothing is left to insert; the best tree has {reached}"]
         case "limit-reached":
@@ -70,6 +85,11 @@ def plan_summary(plan: Plan) -> list[str]:
             return [f"target {wanted} not reached: {stop}; the best tree so far has {reached}"]
         case "interrupted":
             return [f"interrupted; the best tree so far has {reached}"]
+
+
+def within(max_actions: int | None) -> str:
+    """`` with at most 3 actions``; nothing where their number is not bounded."""
+    return "" if max_actions is None else f" with at most {counted(max_actions, 'action')}"
 
 
 def figures_report(tree: Tree, figures: Figures) -> list[str]:
@@ -83,7 +103,10 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     for share in figures.failures:
         what = "no condition failed"
         if share.condition is None and share.node in attempts:
-            what = f"all {counted(attempts[share.node], 'attempt')} used up"
+            number = attempts[share.node]
+            what = "the only attempt used up" if number == 1 else f"all {number} attempts used up"
+            if share.status is Status.RUNNING:
+                what += " (blocked)"
         elif share.condition is not None:
             word = "unknown" if share.status is Status.RUNNING else "false"
             what = f"{describe(tree.task, share.condition)} is {word}"

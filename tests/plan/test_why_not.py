@@ -74,6 +74,36 @@ def test_many_dead_ends_are_summed_up() -> None:
     assert lines[-1] == "  1/10 (0.1): 2 more ways to end without the goal"
 
 
+def test_ends_for_lack_of_actions_are_told_in_sum() -> None:
+    ends = [
+        DeadEnd(Fraction(1, 4), "a()", None, ("goal()",)),
+        DeadEnd(Fraction(1, 8), "flip()", None, ()),
+        DeadEnd(Fraction(1, 16), "look()", None, ()),
+    ]
+    assert dead_end_lines(ends, 3) == [
+        "  3/16 (0.1875): too few of the 3 actions are left",
+        "  1/4 (0.25): after a(), nothing can bring about goal()",
+    ]
+
+
+def test_a_target_out_of_reach_within_some_actions_is_told_with_their_number(tmp_path: Path) -> None:
+    """Three tosses of a coin come up heads once with probability 7/8."""
+    file = tmp_path / "coin.pddl"
+    file.write_text(
+        """(define (domain coin) (:predicates (heads))
+          (:action toss :precondition (not (heads)) :effect (probabilistic 1/2 (heads))))
+        (define (problem three) (:domain coin) (:init) (:goal (heads)) (:goal-probability 0.9))"""
+    )
+    done = bbtc("plan", str(file), "--max-actions", "3", "-q")
+    assert done.status == 1
+    policy = "any policy with at most 3 actions"
+    assert done.err.splitlines() == [
+        f"target 9/10 (0.9) is out of reach of {policy}; the best tree has success probability 7/8 (0.875)",
+        "the best that any policy can do with at most 3 actions is 7/8 (0.875)",
+        "  1/8 (0.125): too few of the 3 actions are left",
+    ]
+
+
 def test_facts_that_nothing_tells_or_undoes_are_named_as_such() -> None:
     blocks = (
         Block("seen(cup)", T, Truth.UNKNOWN, "grab(cup)", None),

@@ -1,0 +1,45 @@
+"""What `bbtc plan` and `bbtc simulate` say of a tree that was simplified after its last refinement."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.domains.problems import bbtc
+
+COIN = """(define (domain coin) (:predicates (heads) (shown))
+  (:action toss :precondition (not (heads)) :effect (probabilistic 1/2 (heads)))
+  (:action show :precondition (heads) :effect (shown)))
+(define (problem toss) (:domain coin) (:goal (shown)))"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    """The coin."""
+    (tmp_path / "coin.pddl").write_text(COIN)
+    return tmp_path / "coin.pddl"
+
+
+def test_the_last_step_and_the_tree_do_not_differ_without_a_word(file: Path) -> None:
+    """Tossed without end it comes up heads for sure; three tosses are enough for 0.8."""
+    done = bbtc("plan", str(file), "--strategy", "search", "--target", "0.8")
+    assert [line.strip() for line in done.err.splitlines()[-4:-1]] == [
+        "success 1, 7 nodes",
+        "then simplified, with no more attempts than the target takes:",
+        "success 7/8 (0.875), 8 nodes",
+    ]
+
+
+def test_a_tree_that_stays_as_it_is_gets_no_such_line(file: Path) -> None:
+    done = bbtc("plan", str(file), "--strategy", "search", "--retries", "unbounded", "--target", "1")
+    assert "simplified" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("target", "told"), [("0.5", "the only attempt used up"), ("0.8", "all 3 attempts used up")]
+)
+def test_used_up_attempts_are_counted(file: Path, tmp_path: Path, target: str, told: str) -> None:
+    tree = str(tmp_path / "tree.json")
+    bbtc("plan", str(file), "--strategy", "search", "--target", target, "-q", "-o", tree)
+    assert told in bbtc("simulate", tree).out.decode()
