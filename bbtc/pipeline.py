@@ -200,8 +200,10 @@ def import_tree(
     """
     from bbtc.artefacts import load_tree
     from bbtc.artefacts.btcpp_xml import tree_from_btcpp
-    from bbtc.artefacts.kinds import is_xml
+    from bbtc.artefacts.kinds import is_artefact, is_xml
 
+    if not is_xml(source) and not is_artefact(source):
+        load_tree(source)  # tells what it is instead
     task = _task_for_import(others, report, limits)
     if not is_xml(source):
         tree = load_tree(source, task)

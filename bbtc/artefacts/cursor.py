@@ -184,7 +184,8 @@ class At:
         text = self.string()
         if text not in choices:
             listed = ", ".join(f"'{choice}'" for choice in choices)
-            raise self.fault("BBT0604", f"must be one of {listed}, not '{clip(text)}'")
+            message = f"must be one of {listed}, not '{clip(text)}'"
+            raise self.fault("BBT0604", message, nearest(text, choices))
         return text
 
     def number(self) -> Fraction:
@@ -232,8 +233,12 @@ def _kind(value: object) -> str:
 
 def clip(text: str) -> str:
     """Text of a stranger for a message: printable and not too long."""
-    shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in shown)
+    return legible(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…")
+
+
+def legible(text: str) -> str:
+    """A message that cites a stranger: printable."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def nearest(name: str, known: Sequence[str]) -> str | None:

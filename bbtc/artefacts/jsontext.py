@@ -96,13 +96,24 @@ def loads(source: SourceFile) -> object:
         )
     except json.JSONDecodeError as error:
         span = Span(source, error.pos, error.pos + 1)
-        raise BbtcError.single("BBT0601", f"not valid JSON: {_lower_first(error.msg)}", span) from None
+        message = f"not valid JSON: {_lower_first(error.msg)}"
+        raise BbtcError.single("BBT0601", message, span, _other_kind(source.text[:1000])) from None
     except RecursionError:
         raise BbtcError.single("BBT0605", "JSON nested too deeply", _top(source)) from None
     except _RepeatedMember:
         raise BbtcError(_repeated_members(source)) from None
     except ValueError as error:
         raise BbtcError.single("BBT0601", f"not valid JSON: {error}", _top(source)) from None
+
+
+def _other_kind(text: str) -> str | None:
+    """What a text may be that is not JSON, and what to do with it."""
+    first = text.lstrip()[:1]
+    if first == "<":
+        return "this seems to be XML: `bbtc import` reads the trees of BehaviorTree.CPP files"
+    if first in {"(", ";"}:
+        return "this seems to be a domain or a problem: `bbtc plan` makes a tree of them"
+    return None
 
 
 def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:

@@ -175,6 +175,12 @@ def task_from_json(value: object, source: SourceFile | None = None) -> Task:
     return run_reader(lambda faults: read_task(At(value), faults), source)
 
 
+_WHENCE = {
+    "bbtc-task": "`bbtc compile` makes a task of a domain and a problem",
+    "bbtc-tree": "`bbtc plan` makes a tree of a task, or of a domain and a problem",
+}
+
+
 def check_header(at: At, name: str, version: int) -> None:
     """Raise a fault unless the value is an object of this format and version."""
     members = dict(at.entries())
@@ -182,7 +188,8 @@ def check_header(at: At, name: str, version: int) -> None:
         if field not in members:
             raise at.fault("BBT0602", f"not a {name} artefact: field '{field}' is missing")
     if members["format"].value != name:
-        raise members["format"].fault("BBT0602", f"not a {name} artefact")
+        hint = _WHENCE.get(name) if str(members["format"].value) in _WHENCE else None
+        raise members["format"].fault("BBT0602", f"not a {name} artefact", hint)
     found = members["version"].value
     if found != version or isinstance(found, bool):
         newer = isinstance(found, int) and found > version

@@ -285,13 +285,14 @@ def make_tree(manifest: Manifest, entry: TreeEntry) -> Made:
 def _sources(contents: Contents, entry: TreeEntry) -> tuple[tuple[str, bytes], ...]:
     """The inputs of a tree, with the names that messages give them. Raises :class:`BbtcError`."""
     sources = []
-    for path in entry.inputs:
+    for number, path in enumerate(entry.inputs):
         shown = source_name(contents.folder, path)
         try:
             sources.append((shown, contents.read(path)))
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
-            raise BbtcError.single("BBT0001", f"cannot read {shown}: {reason}", entry.span) from error
+            span = entry.input_spans[number] if entry.input_spans else entry.span
+            raise BbtcError.single("BBT0001", f"cannot read {shown}: {reason}", span) from error
     return tuple(sources)
 
 
@@ -312,6 +313,7 @@ def _without_places(entry: TreeEntry) -> TreeEntry:
     return replace(
         entry,
         span=None,
+        input_spans=(),
         exports=tuple(replace(export, span=None) for export in entry.exports),
         expect=tuple(replace(expectation, span=None) for expectation in entry.expect),
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from bbtc.artefacts.numbers import figure_text
-from bbtc.cli.wording import counted, exact, within
+from bbtc.cli.wording import counted, exact, oneof_note, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -42,6 +42,9 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
         lines.append(f"least expected cost of reaching it so often: {mark}{exact(value.cost)}")
     some = "" if value.expanded == value.states else f" found, {value.expanded} expanded"
     lines.append(f"{counted(value.states, 'state')}{some}, {counted(value.choices, 'choice')}")
+    note = oneof_note(task)
+    if note:
+        lines.append(f"oneof: {note}")
     if value.stop is not None:
         lines.append(value.stop.message)
     if value.interrupted:

@@ -10,6 +10,7 @@ from bbtc.belief.tick import Status
 from bbtc.cli.counting import counted
 from bbtc.export.names import printable
 from bbtc.ground.describe import describe
+from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
 from bbtc.plan.result import Plan, Refinement
 from bbtc.tree.nodes import Tree, retries_of, walk
@@ -19,11 +20,14 @@ __all__ = [
     "counted",
     "exact",
     "figures_report",
+    "oneof_note",
     "plan_summary",
     "refinement_line",
     "simplified_line",
     "within",
 ]
+
+_MOST_NAMED = 5  # actions named of many
 
 
 def changes(tree: Tree, before: bytes, after: bytes) -> str:
@@ -92,6 +96,18 @@ def within(max_actions: int | None) -> str:
     return "" if max_actions is None else f" with at most {counted(max_actions, 'action')}"
 
 
+def oneof_note(task: Task) -> str:
+    """Which actions have outcomes whose probabilities nobody knows; empty where none has."""
+    names = list(dict.fromkeys(a.schema for a in task.actions if any(map(_has_oneof, a.factors))))
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    listed = printable(", ".join(names[:_MOST_NAMED]))
+    return f"outcomes of {listed}{more} count as equally likely" if names else ""
+
+
+def _has_oneof(factor: Factor) -> bool:
+    return factor.oneof or any(_has_oneof(inner) for each in factor.outcomes for inner in each.factors)
+
+
 def figures_report(tree: Tree, figures: Figures) -> list[str]:
     """The figures of a tree as lines of text."""
     lines = [f"success   {exact(figures.success)}", f"failure   {exact(figures.failure)}"]
@@ -114,6 +130,9 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     lines.append(f"cost      {expected(figures.cost, figures.cost_given_success)}")
     lines.append(f"actions   {expected(figures.actions, figures.actions_given_success)}")
     lines.append(f"states    {figures.states}")
+    note = oneof_note(tree.task)
+    if note:
+        lines.append(f"oneof     {note}")
     return lines
 
 

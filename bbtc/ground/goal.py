@@ -42,4 +42,7 @@ def _achievers(model: md.Model, part: mf.Formula) -> str | None:
     if not setters:
         return f"no action makes `{atom.predicate}` {value.word}"
     listed = ", ".join(setters[:5])
-    return f"only {listed} could, but cannot apply, or not to these objects: check the preconditions"
+    return (
+        f"only {listed} could, but cannot apply, or not to these objects: `bbtc check` may tell "
+        "which precondition is never true"
+    )

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from types import MappingProxyType
 
+from bbtc.artefacts.cursor import clip, nearest
 from bbtc.artefacts.numbers import exact, parse_written
 from bbtc.belief.simulate import Figures
 from bbtc.source import Span
@@ -63,5 +64,6 @@ def parse_expectation(text: str, span: Span | None = None) -> Expectation:
         raise ValueError("an expectation is FIGURE COMPARISON NUMBER, such as 'success >= 0.95'")
     figure, comparison, number = match.groups()
     if figure not in FIGURES:
-        raise ValueError(f"unknown figure '{figure}'; there are {', '.join(FIGURES)}")
+        advice = nearest(figure, tuple(FIGURES)) or f"there are {', '.join(FIGURES)}"
+        raise ValueError(f"unknown figure '{clip(figure)}'; {advice}")
     return Expectation(figure, comparison, parse_written(number), text.strip(), span)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
-from bbtc.artefacts.cursor import At, Fault, Faults, clip, run_reader
+from bbtc.artefacts.cursor import At, Fault, Faults, clip, legible, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.diagnostics import BbtcError
 from bbtc.export.registry import Exporter, load_exporter, parse_options
@@ -63,6 +63,8 @@ class TreeEntry:
     exports: tuple[Export, ...] = ()
     expect: tuple[Expectation, ...] = ()
     span: Span | None = field(default=None, compare=False)
+    input_spans: tuple[Span | None, ...] = field(default=(), compare=False)
+    """Where the manifest names the inputs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +132,8 @@ class _Reader:
         if "domain" not in found:
             raise at.fault("BBT0603", "field 'domain' is missing")
         attempt = self.faults.attempt
-        inputs = tuple(self.faults.each([found[key] for key in _INPUTS if key in found], _path))
+        given = [found[key] for key in _INPUTS if key in found]
+        inputs = tuple(self.faults.each(given, _path))
         file = f"{self.output}/{name}.tree.json"
         if "tree" in found:
             file = attempt(lambda: _inside(found["tree"]), file)
@@ -151,6 +154,7 @@ class _Reader:
             exports=optional("exports", lambda each: self._exports(each, name), ()),
             expect=optional("expect", self._expectations, ()),
             span=self.marked.span(at.path),
+            input_spans=tuple(self.marked.span(each.path) for each in given),
         )
 
     def _limits(self, at: At) -> tuple[tuple[str, int], ...]:
@@ -164,7 +168,7 @@ class _Reader:
         try:
             return parse_expectation(_text(at), self.marked.span(at.path))
         except ValueError as error:
-            raise at.fault("BBT0604", clip(str(error))) from None
+            raise at.fault("BBT0604", legible(str(error))) from None
 
     # --- exports -----------------------------------------------------------------------------
 
@@ -261,7 +265,7 @@ def _target(at: At) -> Fraction:
     try:
         return parse_probability(at.string())
     except ValueError as error:
-        raise at.fault("BBT0604", clip(str(error))) from None
+        raise at.fault("BBT0604", legible(str(error))) from None
 
 
 def _path(at: At) -> str:

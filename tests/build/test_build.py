@@ -290,6 +290,20 @@ def test_a_failure_loses_no_other_tree_and_writes_nothing(tmp_path: Path, name: 
     assert "3 trees: 0 built, 2 up to date, 1 failed" in again.stderr
 
 
+@pytest.mark.parametrize(
+    ("manifest", "place"),
+    [
+        ("trees:\n  a:\n    domain: coin.pddl\n    problem: gone.pddl\n", "bbtc.yaml:4:14: "),
+        ("defaults:\n  domain: gone.pddl\ntrees:\n  a:\n    problem: coin.pddl\n", "bbtc.yaml:2:11: "),
+    ],
+)
+def test_a_missing_file_is_shown_where_the_manifest_names_it(
+    tmp_path: Path, manifest: str, place: str
+) -> None:
+    done = bbtc(project(tmp_path, manifest, coin_pddl=COIN), "build")
+    assert f"{place}error[BBT0001]: cannot read gone.pddl" in done.stderr
+
+
 def test_the_files_of_a_tree_that_fails_stay_as_they_were(tmp_path: Path) -> None:
     folder = several(tmp_path, 2, per_domain=1)
     run(folder)

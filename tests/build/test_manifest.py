@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 from fractions import Fraction
 from pathlib import Path
@@ -173,6 +174,24 @@ def test_a_fault_has_its_code_and_place(name: str) -> None:
     ((found_code, found_place, message),) = faults(text)
     assert (found_code, found_place) == (code, place), message
     assert words in message
+
+
+def test_a_slip_is_told_with_what_is_meant_and_in_full() -> None:
+    ((_, _, figure),) = faults(BASE + "    expect: [sucess >= 1]\n")
+    assert figure.endswith("unknown figure 'sucess'; did you mean 'success'?")
+    ((_, _, form),) = faults(BASE + "    expect: [cost =< 1]\n")
+    assert form.endswith("an expectation is FIGURE COMPARISON NUMBER, such as 'success >= 0.95'")
+    with pytest.raises(BbtcError) as error:
+        read(BASE + "    strategy: serach\n")
+    assert error.value.diagnostics[0].hint == "did you mean 'search'?"
+
+
+def test_what_the_page_shows_of_exports_is_read() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "build.md").read_text()
+    blocks = re.findall(r"```yaml\n(exports:\n.*?)```", page, re.DOTALL)
+    assert blocks
+    for block in blocks:
+        assert read(BASE + re.sub("^", "    ", block, flags=re.MULTILINE)).trees[0].exports
 
 
 TOML_FAULTS = {

@@ -130,6 +130,34 @@ def test_no_usable_file(folder: Path, command: str, content: bytes | None, words
     assert words in assert_refused(done, folder, "odd").lower()
 
 
+@pytest.mark.parametrize("command", ["simulate", "verify", "run"])
+@pytest.mark.parametrize(
+    ("file", "advice"),
+    [
+        ("domain.pddl", "`bbtc plan` makes a tree"),
+        ("task.json", "`bbtc plan` makes a tree of a task"),
+        ("tree.xml", "`bbtc import` reads"),
+    ],
+)
+def test_a_file_that_is_no_tree_is_told_what_makes_a_tree_of_it(
+    folder: Path, command: str, file: str, advice: str
+) -> None:
+    bbtc("compile", "domain.pddl", "problem.pddl", "-o", "task.json", folder=folder)
+    (folder / "tree.xml").write_text('<?xml version="1.0"?>\n<root BTCPP_format="4"/>\n')
+    assert_refused(bbtc(command, file, folder=folder), folder, advice, place=f"{file}:")
+
+
+def test_a_tree_is_no_task(folder: Path) -> None:
+    assert bbtc("plan", "domain.pddl", "problem.pddl", "-o", "tree.json", folder=folder).returncode == 0
+    done = bbtc("plan", "tree.json", "-o", "out.json", folder=folder)
+    assert_refused(done, folder, "`bbtc compile` makes a task", place="tree.json:2:13")
+
+
+def test_import_of_a_domain_says_that_it_is_none_of_its_files(folder: Path) -> None:
+    done = bbtc("import", "domain.pddl", "problem.pddl", "-o", "out.json", folder=folder)
+    assert_refused(done, folder, "this seems to be a domain or a problem", place="domain.pddl:1:1")
+
+
 def test_a_folder_is_not_a_file(folder: Path) -> None:
     (folder / "sub").mkdir()
     assert_refused(bbtc("compile", "sub", "-o", "out.json", folder=folder), folder, "sub")

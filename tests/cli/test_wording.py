@@ -1,4 +1,4 @@
-"""What `bbtc plan` and `bbtc simulate` say of a tree that was simplified after its last refinement."""
+"""What `bbtc plan` and `bbtc simulate` say of figures: whence a difference, and what they rest on."""
 
 from __future__ import annotations
 
@@ -34,6 +34,22 @@ def test_the_last_step_and_the_tree_do_not_differ_without_a_word(file: Path) -> 
 def test_a_tree_that_stays_as_it_is_gets_no_such_line(file: Path) -> None:
     done = bbtc("plan", str(file), "--strategy", "search", "--retries", "unbounded", "--target", "1")
     assert "simplified" not in done.err
+
+
+def test_chances_that_nobody_knows_are_named(tmp_path: Path) -> None:
+    """One action has a `oneof`, one another within a draw, one none."""
+    file, tree = tmp_path / "walk.pddl", str(tmp_path / "tree.json")
+    file.write_text(
+        """(define (domain walk) (:predicates (there) (back) (rested))
+          (:action go :precondition (not (there)) :effect (oneof (there) (and)))
+          (:action come :precondition (there) :effect (probabilistic 1/2 (oneof (back) (and))))
+          (:action rest :precondition (back) :effect (rested)))
+        (define (problem stroll) (:domain walk) (:goal (rested)))"""
+    )
+    note = "outcomes of come, go count as equally likely"
+    assert f"oneof: {note}\n" in bbtc("plan", str(file), "--bounds").out.decode()
+    bbtc("plan", str(file), "-q", "-o", tree)
+    assert f"oneof     {note}\n" in bbtc("simulate", tree).out.decode()
 
 
 @pytest.mark.parametrize(

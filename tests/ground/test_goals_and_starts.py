@@ -50,11 +50,12 @@ def test_every_unreachable_part_of_the_goal_is_pointed_at() -> None:
 
 
 def test_an_unreachable_goal_names_the_actions_that_could_have_helped() -> None:
+    advice = "`bbtc check` may tell which precondition is never true"
     assert _errors("", "(p a)") == [
         (
             "BBT0412",
             "(p a)",
-            "only `set` could, but cannot apply, or not to these objects: check the preconditions",
+            f"only `set` could, but cannot apply, or not to these objects: {advice}",
         )
     ]
 
