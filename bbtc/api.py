@@ -182,7 +182,8 @@ def scenarios(tree: Source | Tree | Plan, count: int, *, limits: Limits | None =
     from bbtc import pipeline
     from bbtc.belief.scenarios import scenarios as runs
 
-    return list(islice(runs(pipeline.simulate_tree(_tree(tree, limits), limits or Limits())[1]), count))
+    limits = limits or Limits()
+    return list(islice(runs(pipeline.simulate_tree(_tree(tree, limits), limits)[1], limits), count))
 
 
 def verify(tree: Source | Tree | Plan, *, engine: Engine = "auto", limits: Limits | None = None) -> Verdict:

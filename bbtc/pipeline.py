@@ -15,6 +15,7 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
 from bbtc.plan.options import DEFAULTS, Options
+from bbtc.rounding import figure_text
 from bbtc.source import SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import Status, Tree
@@ -230,7 +231,8 @@ def _with_figures(tree: Tree, source: SourceFile, report: Report, limits: Limits
     success = simulate_tree(tree, limits)[0].success
     if success == tree.success_probability:
         return tree
-    message = f"{source.name} claims success probability {tree.success_probability}; it is {success}"
+    claimed, found = figure_text(tree.success_probability), figure_text(success)
+    message = f"{source.name} claims success probability {claimed}; it is {found}"
     report.add(Diagnostic("BBT0801", message, severity=Severity.NOTE))
     if success >= tree.target:
         status: Status = "target-reached"

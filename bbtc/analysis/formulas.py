@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from math import lcm
 from typing import TYPE_CHECKING
 
 from typing_extensions import assert_never
@@ -12,11 +13,12 @@ from bbtc.diagnostics import Related
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
+from bbtc.rounding import decimal, too_long
 from bbtc.source import Span
 from bbtc.syntax import ast
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
 ROUNDING = Fraction(1, 10**9)
 """Probabilities whose sum differs from 1 by at most this are taken as rounded: each is divided
@@ -170,7 +172,11 @@ def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Cho
             )
             faulty = True
         drawn.append((value, effect(names, branch.effect, scope), branch))
-    total = sum((value for value, _, _ in drawn), Fraction(0))
+    if _too_long_together(branch.probability.value for branch in node.branches):
+        message = "the sum of the probabilities has too many digits"
+        names.report.error("BBT0113", message, node.span, "give them a common denominator")
+        faulty = True
+    total = Fraction(1) if faulty else sum((value for value, _, _ in drawn), Fraction(0))
     if faulty:
         total = Fraction(1)
     elif total > 1 + ROUNDING:
@@ -188,13 +194,23 @@ def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Cho
     return me.Choice(tuple(branches), False, node.span)
 
 
+def _too_long_together(values: Iterable[Fraction]) -> bool:
+    """May some of the numbers have a sum with too many digits?"""
+    common = 1
+    for value in values:
+        common = lcm(common, value.denominator)
+        if too_long(Fraction(1, common)):
+            return True
+    return False
+
+
 def percentage(value: Fraction) -> str | None:
     """The hint about a probability that is too large, if it seems to be a percentage."""
     return f"if this is a percentage, write {_decimal(value / 100)}" if 2 <= value <= 100 else None
 
 
 def _decimal(value: Fraction) -> str:
-    return f"{float(value):.12g}"
+    return decimal(value, 12)
 
 
 def _fluent_effect(names: Names, node: ast.FluentEffect, scope: Scope) -> me.Effect:

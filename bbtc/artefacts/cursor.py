@@ -13,6 +13,7 @@ from typing import TypeAlias, TypeVar
 from bbtc.artefacts.jsontext import Path, locate, path_text
 from bbtc.artefacts.numbers import MAX_LENGTH, parse_number
 from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.rounding import too_long
 from bbtc.source import SourceFile, Span
 
 _T = TypeVar("_T")
@@ -201,9 +202,22 @@ class At:
                 "BBT0604", f"not a number: '{clip(text)}'{more}", 'write it as "0.95", "7/8" or "2"'
             ) from None
 
+    def given(self) -> Fraction:
+        """A number that all is computed from, which is to be short."""
+        value = self.number()
+        if too_long(value):
+            raise self.fault("BBT0604", f"the number {clip(self.string())} has too many digits")
+        return value
+
     def probability(self, zero: bool = True) -> Fraction:
         """A number from 0 to 1; above 0 unless ``zero``."""
-        value = self.number()
+        return self._within(self.number(), zero)
+
+    def given_probability(self, zero: bool = True) -> Fraction:
+        """A short one, as :meth:`given`."""
+        return self._within(self.given(), zero)
+
+    def _within(self, value: Fraction, zero: bool) -> Fraction:
         if value > 1 or value < 0 or (value == 0 and not zero):
             low = "from 0 to" if zero else "above 0, up to"
             raise self.fault("BBT0604", f"a probability is {low} 1, not {clip(self.string())}")

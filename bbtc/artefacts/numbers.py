@@ -11,6 +11,12 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
+from bbtc.rounding import CHUNK, decimal, digits, figure_text
+
+__all__ = [
+    "MAX_LENGTH", "exact", "figure_text", "given_text", "parse_number", "parse_probability", "parse_written",
+]  # fmt: skip
+
 MAX_LENGTH = 100_000
 """Characters a number may have in an artefact, so that reading one cannot take minutes."""
 
@@ -18,7 +24,6 @@ _MAX_DECIMALS = 18
 _LONGEST_SHOWN = 25
 _LONGEST_WRITTEN = 1000  # characters; a probability with more is a mistake or an attack
 _LONG_EXPONENT = re.compile(r"[eE][-+]?[0-9_]{4}")  # 10 to such powers takes for ever to compute
-_CHUNK = 1000  # digits converted at a time: Python refuses to convert more than 4300 at once
 _NUMBER = re.compile(r"(-?)(?:([0-9]+)(?:\.([0-9]+))?|([0-9]+)/([0-9]+))", re.ASCII)
 
 
@@ -27,16 +32,9 @@ def given_text(value: Fraction) -> str:
     decimals = _decimals(value.denominator)
     if not decimals:
         return figure_text(value)
-    digits = _digits(abs(value.numerator) * 10**decimals // value.denominator).rjust(decimals + 1, "0")
+    text = digits(abs(value.numerator) * 10**decimals // value.denominator).rjust(decimals + 1, "0")
     sign = "-" if value < 0 else ""
-    return f"{sign}{digits[:-decimals]}.{digits[-decimals:]}"
-
-
-def figure_text(value: Fraction) -> str:
-    """A computed number: ``31/32``, ``0``, ``1``."""
-    sign = "-" if value < 0 else ""
-    numerator = f"{sign}{_digits(abs(value.numerator))}"
-    return numerator if value.denominator == 1 else f"{numerator}/{_digits(value.denominator)}"
+    return f"{sign}{text[:-decimals]}.{text[-decimals:]}"
 
 
 def parse_number(text: str) -> Fraction:
@@ -57,14 +55,15 @@ def parse_number(text: str) -> Fraction:
 
 
 def exact(value: Fraction) -> str:
-    """A number for people: ``7/8 (0.875)``, ``1``; a fraction too long to read is given as a decimal
+    """A number for people: ``7/8 (0.875)``, ``1``; a number too long to read is given as a decimal
     marked ``≈``."""
-    if value.denominator == 1:
-        return str(value.numerator)
-    text = f"{value.numerator}/{value.denominator}" if value.denominator < 10**_LONGEST_SHOWN else ""
-    decimal = f"{float(value):.6g}"
-    mark = "" if Fraction(decimal) == value else "≈ "
-    return f"{text} ({mark}{decimal})" if text and len(text) <= _LONGEST_SHOWN else f"≈ {decimal}"
+    short = max(abs(value.numerator), value.denominator) < 10**_LONGEST_SHOWN
+    text = str(value) if short else ""
+    if short and value.denominator == 1:
+        return text
+    near = decimal(value, 6)
+    mark = "" if Fraction(near) == value else "≈ "
+    return f"{text} ({mark}{near})" if text and len(text) <= _LONGEST_SHOWN else f"≈ {near}"
 
 
 def parse_probability(text: str) -> Fraction:
@@ -97,18 +96,9 @@ def _decimals(denominator: int) -> int:
     return 0
 
 
-def _digits(value: int) -> str:
-    chunks: list[str] = []
-    base = 10**_CHUNK
-    while value >= base:
-        value, rest = divmod(value, base)
-        chunks.append(str(rest).rjust(_CHUNK, "0"))
-    return "".join([str(value), *reversed(chunks)])
-
-
-def _integer(digits: str) -> int:
+def _integer(text: str) -> int:
     value = 0
-    for start in range(0, len(digits), _CHUNK):
-        chunk = digits[start : start + _CHUNK]
+    for start in range(0, len(text), CHUNK):
+        chunk = text[start : start + CHUNK]
         value = value * 10 ** len(chunk) + int(chunk)
     return value

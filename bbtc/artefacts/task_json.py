@@ -223,10 +223,13 @@ def read_task(at: At, faults: Faults) -> Task:
             sorted(faults.each(_optional(members, "templates"), reader.template), key=lambda t: t.name)
         ),
         goal_probability=faults.attempt(
-            lambda: members["goal_probability"].probability() if "goal_probability" in members else _ONE, _ONE
+            lambda: (
+                members["goal_probability"].given_probability() if "goal_probability" in members else _ONE
+            ),
+            _ONE,
         ),
         goal_reward=faults.attempt(
-            lambda: members["goal_reward"].number() if "goal_reward" in members else _ZERO, _ZERO
+            lambda: members["goal_reward"].given() if "goal_reward" in members else _ZERO, _ZERO
         ),
         metric=faults.attempt(lambda: _metric(members), "cost"),
         signatures=tuple(
@@ -320,7 +323,7 @@ class _Reader:
         if len(values) < len(self.variables):
             first = next(v.name for i, v in enumerate(self.variables) if i not in values)
             raise members["assign"].fault("BBT0603", f"variable '{clip(first)}' has no initial value")
-        probability = members["p"].probability(zero=False)
+        probability = members["p"].given_probability(zero=False)
         return InitialState(probability, tuple(values[i] for i in range(len(self.variables))))
 
     def _assignment(self, at: At) -> dict[int, Truth]:
@@ -344,7 +347,7 @@ class _Reader:
             args,
             self.condition(members["precondition"]),
             self.chance(at, members),
-            members["cost"].number(),
+            members["cost"].given(),
         )
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
@@ -370,11 +373,11 @@ class _Reader:
         if depth > MAX_NESTING:
             raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
         return Outcome(
-            members["p"].probability(zero=False),
+            members["p"].given_probability(zero=False),
             tuple(self._effect(element) for element in members["effects"].elements()),
             self.chance(at, members, depth + 1) if "factors" in members or "oneof" in members else (),
-            members["reward"].number() if "reward" in members else _ZERO,
-            members["cost"].number() if "cost" in members else _ZERO,
+            members["reward"].given() if "reward" in members else _ZERO,
+            members["cost"].given() if "cost" in members else _ZERO,
         )
 
     def _effect(self, at: At) -> Effect:

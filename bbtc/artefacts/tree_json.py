@@ -127,7 +127,7 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
         root,
         faults.attempt(members["success_probability"].probability, Fraction(0)),
         faults.attempt(
-            lambda: members["target"].probability() if "target" in members else task.goal_probability,
+            lambda: members["target"].given_probability() if "target" in members else task.goal_probability,
             Fraction(1),
         ),
         faults.attempt(lambda: _STATUSES[members["status"].word(*_STATUSES)], "stuck"),

@@ -12,6 +12,7 @@ from fractions import Fraction
 from bbtc.belief.chain import Chain
 from bbtc.belief.state import Values
 from bbtc.belief.tick import Status
+from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode
 
 
@@ -38,12 +39,20 @@ class Scenario:
         return self.steps[-1].values if self.steps else self.initial
 
 
+_LOOK = 8  # steps between two looks at the clock: probabilities may have very many digits
+_LISTING = "the listing of runs"
+
 _Path = tuple[int, "_Path | None"]  # last state, and the path before it
 
 
-def scenarios(chain: Chain) -> Iterator[Scenario]:
+def scenarios(chain: Chain, limits: Limits) -> Iterator[Scenario]:
     """Every scenario in order of decreasing probability (ties in breadth-first order of the
-    states). Endless where the chain has loops: take as many as needed. Runs that never end are none."""
+    states). Endless where the chain has loops: take as many as needed. Runs that never end are none.
+
+    Raises :class:`bbtc.diagnostics.LimitReached` past the limits on states (here: of steps in runs) and
+    time: of an action that nearly always fails and is tried again, each run is nearly as probable as the
+    one before.
+    """
     ending = _ending(chain)
     queue: list[tuple[Fraction, int, _Path]] = []
     count = 0
@@ -51,7 +60,13 @@ def scenarios(chain: Chain) -> Iterator[Scenario]:
         if state in ending:
             heapq.heappush(queue, (-probability, count, (state, None)))
             count += 1
-    while queue:
+    for step in itertools.count():
+        if not queue:
+            return
+        if step % _LOOK == 0:
+            limits.check_time(_LISTING, step)
+        if step > limits.states:
+            limits.check_states(step, _LISTING)
         negative, _, path = heapq.heappop(queue)
         edges = chain.edges[path[0]]
         if not edges:
@@ -111,15 +126,19 @@ class Sampling:
     """Runs stopped after ``max_steps`` actions without an end."""
 
 
-def sample(chain: Chain, samples: int, seed: int, max_steps: int = 100_000) -> Sampling:
-    """Simulate ``samples`` runs with a seeded generator; the same seed gives the same result."""
+def sample(chain: Chain, samples: int, seed: int, limits: Limits, max_steps: int = 100_000) -> Sampling:
+    """Simulate ``samples`` runs with a seeded generator; the same seed gives the same result. Raises
+    :class:`bbtc.diagnostics.LimitReached` when the time is over."""
     generator = random.Random(seed)
     successes = cut = 0
     starts = _cumulative(chain.initial)
     moves = [_cumulative([(e.result.probability, e.target) for e in edges]) for edges in chain.edges]
     for _ in range(samples):
+        limits.check_time("sampling")
         state = _draw(generator, starts)
-        for _step in range(max_steps):
+        for step in range(max_steps):
+            if step % 1024 == 1023:
+                limits.check_time("sampling")
             if not moves[state]:
                 successes += chain.status[state] is Status.SUCCESS
                 break

@@ -9,6 +9,7 @@ from bbtc.cli.wording import counted, exact
 from bbtc.comparison import Comparison, FigureChange
 from bbtc.export.names import printable
 from bbtc.export.outline import UNICODE, label, outline
+from bbtc.rounding import decimal
 from bbtc.tree.difference import Difference, counts
 from bbtc.tree.nodes import walk
 
@@ -31,7 +32,7 @@ def _row(figure: FigureChange) -> _Row:
     change = ""
     if figure.old is not None and figure.new is not None and figure.differs:
         difference = figure.new - figure.old
-        change = f"{'+' if difference > 0 else '-'}{float(abs(difference)):.4g}"
+        change = f"{'+' if difference > 0 else '-'}{decimal(abs(difference), 4)}"
     old, new = ("infinite" if value is None else exact(value) for value in (figure.old, figure.new))
     return _Row(figure.name, old, new, change, figure.differs)
 

@@ -179,6 +179,7 @@ def _fitted(lines: list[str], height: int) -> list[str]:
 def _frame(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
     """One tick: what changed, the tree with what its nodes returned, and what may come."""
     from bbtc.cli.wording import changes
+    from bbtc.rounding import figure_text
 
     moments, now = stepper.moments, stepper.now
     if len(moments) == 1:
@@ -195,7 +196,7 @@ def _frame(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
     lines.append(f"starts {now.action.action}; its outcomes:")
     for number, branch in enumerate(now.branches, 1):
         did = changes(tree, now.state.values, branch.values)
-        lines.append(f"  {number}. with probability {branch.probability}: {did}")
+        lines.append(f"  {number}. with probability {figure_text(branch.probability)}: {did}")
     return lines
 
 

@@ -9,10 +9,11 @@ import click
 
 from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
+from bbtc.diagnostics import LimitReached
 from bbtc.files import write
 
 if TYPE_CHECKING:
-    from bbtc.belief.chain import Chain
+    from bbtc.belief.scenarios import Scenario
     from bbtc.tree.nodes import Tree
 
 
@@ -49,26 +50,33 @@ def command(
     limits = session.limits
     figures, chain = simulate_tree(loaded, limits)
     session.clear()
-    listed = list(itertools.islice(runs(chain), scenarios))
-    sampled = sample(chain, samples, seed) if samples else None
+    listed: list[Scenario] = []
+    stop: LimitReached | None = None
+    try:
+        for run in itertools.islice(runs(chain, limits), scenarios):
+            listed.append(run)  # noqa: PERF402 - what was found before a limit is worth telling
+    except LimitReached as reached:
+        stop = reached
+    sampled = sample(chain, samples, seed, limits) if samples else None
     if as_json:
         write(output, artefacts.dumps(artefacts.figures_to_json(loaded, figures, listed, sampled)))
-        return
-    lines = figures_report(loaded, figures)
-    if sampled is not None:
-        share = sampled.successes / sampled.samples
-        lines.append(f"sampled   {share:.6g} of {sampled.samples} runs succeed (seed {sampled.seed})")
-    lines.extend(_scenario_lines(loaded, chain, scenarios) if listed else [])
-    write(output, "".join(f"{line}\n" for line in lines))
+    else:
+        lines = figures_report(loaded, figures)
+        if sampled is not None:
+            share = sampled.successes / sampled.samples
+            lines.append(f"sampled   {share:.6g} of {sampled.samples} runs succeed (seed {sampled.seed})")
+        lines.extend(_scenario_lines(loaded, listed))
+        write(output, "".join(f"{line}\n" for line in lines))
+    if stop is not None:
+        raise stop
 
 
-def _scenario_lines(tree: Tree, chain: Chain, count: int) -> list[str]:
-    from bbtc.belief.scenarios import scenarios as runs
+def _scenario_lines(tree: Tree, listed: list[Scenario]) -> list[str]:
     from bbtc.belief.tick import Status
     from bbtc.cli.wording import changes, exact
 
     lines = []
-    for number, run in enumerate(itertools.islice(runs(chain), count), 1):
+    for number, run in enumerate(listed, 1):
         ending = "blocked" if run.status is Status.RUNNING else run.status.word
         lines.append(f"run {number}: probability {exact(run.probability)}, {ending}")
         before = run.initial

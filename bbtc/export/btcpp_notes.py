@@ -27,6 +27,7 @@ from bbtc.export.shape import words_of, written
 from bbtc.ground.condition import TRUE
 from bbtc.ground.describe import condition_as_lists
 from bbtc.ground.task import Task
+from bbtc.rounding import figure_text
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 
 MARK = " bbtc import reads here what the file cannot show:"
@@ -45,12 +46,12 @@ def notes(tree: Tree, root: Node, names: BtcppNames) -> str:
         "version": VERSION,
         "domain": tree.task.domain,
         "problem": tree.task.problem,
-        "success_probability": str(tree.success_probability),
-        "target": str(tree.target),
+        "success_probability": figure_text(tree.success_probability),
+        "target": figure_text(tree.target),
         "status": tree.status,
     }
     if tree.bounds is not None:
-        content["bounds"] = [str(bound) for bound in tree.bounds]
+        content["bounds"] = [figure_text(bound) for bound in tree.bounds]
     if names.namespace:
         content["namespace"] = names.namespace
     content["kinds"] = "".join(kind_of(tree.task, node) for node in walk(root))

@@ -16,12 +16,14 @@ from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
 from bbtc.ground.normal import Block, Chance, free, groups, reads
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
-from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome
+from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome, outcomes_of
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
+from bbtc.rounding import too_long
+from bbtc.source import Span
 
 
 @dataclass(slots=True)
@@ -124,21 +126,31 @@ class EffectLowering:
         self.report = report
 
     def reached(
-        self, block: Block, parameters: tuple[Parameter, ...]
+        self, block: Block, parameters: tuple[Parameter, ...], span: Span | None
     ) -> Shared[tuple[tuple[Factor, ...], Fraction]]:
         """:meth:`LoweredEffect.factors` for many argument rows of an action."""
         used, frame = projection(self.lowering.universe, parameters, reads(block))
-        return Shared(used, len(parameters), self.effect(block, frame).all)
+        return Shared(used, len(parameters), self.effect(block, frame, span).all)
 
-    def effect(self, block: Block, frame: Frame) -> LoweredEffect:
-        """The effect of an action or of a template's guide."""
-        return LoweredEffect(self, block, frame)
+    def effect(self, block: Block, frame: Frame, span: Span | None) -> LoweredEffect:
+        """The effect of an action or of a template's guide, which stands at ``span``."""
+        return LoweredEffect(self, block, frame, span)
+
+    def short(self, value: Fraction, span: Span | None) -> Fraction:
+        """A computed number; one that no artefact could hold is reported and counts 0."""
+        if too_long(value):
+            what = "a probability, cost or reward"
+            self.report.error("BBT0113", f"{what} that is computed here has too many digits", span)
+            return ZERO
+        return value
 
 
 class LoweredEffect:
     """A compiled block."""
 
-    def __init__(self, owner: EffectLowering, block: Block, frame: Frame) -> None:
+    def __init__(self, owner: EffectLowering, block: Block, frame: Frame, span: Span | None = None) -> None:
+        self._owner = owner
+        self._span = span
         self._frame = frame
         self._costs: list[_Addition] = []
         self._groups: list[tuple[_Loop, list[_Leaf]]] = []
@@ -196,7 +208,11 @@ class LoweredEffect:
         """
         part = self.part(env, [])
         cost, part.cost = part.cost, ZERO
-        return _arranged(part), cost
+        factors = _arranged(part)
+        for outcome in outcomes_of(factors):
+            for number in (outcome.probability, outcome.cost, outcome.reward):
+                self._owner.short(number, self._span)
+        return factors, self._owner.short(cost, self._span)
 
     def all(self, rows: list[Row]) -> list[tuple[tuple[Factor, ...], Fraction]]:
         """:meth:`factors` of many argument rows."""
@@ -214,8 +230,10 @@ class LoweredEffect:
         return list(zip(made, costs, strict=True))
 
     def _cost(self, env: Env) -> Fraction:
-        amounts = [each.amount(env) for each in self._costs]
-        return amounts[0] if len(amounts) == 1 else sum(amounts, ZERO)
+        cost = self._costs[0].amount(env)
+        for each in self._costs[1:]:
+            cost = self._owner.short(cost + each.amount(env), self._span)
+        return cost
 
     def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
         """Every variable that may be set, with the conditions under which it is."""
@@ -276,7 +294,7 @@ class _Addition:
     """An increase of cost or reward."""
 
     def __init__(self, owner: EffectLowering, leaf: me.Add, frame: Frame) -> None:
-        self._report = owner.report
+        self._owner = owner
         self._leaf = leaf
         self._value = _Amounts(owner, frame).lower(leaf.amount)
 
@@ -291,13 +309,15 @@ class _Addition:
         if guard is not TRUE:
             if leaf.to == "cost":
                 hint = "write one action for each case"
-                self._report.error("BBT0409", "a cost under a condition cannot be grounded", leaf.span, hint)
+                self._owner.report.error(
+                    "BBT0409", "a cost under a condition cannot be grounded", leaf.span, hint
+                )
             else:
-                self._report.warning("BBT0409", "a reward under a condition is not counted", leaf.span)
+                self._owner.report.warning("BBT0409", "a reward under a condition is not counted", leaf.span)
         elif leaf.to == "cost":
-            part.cost += self.amount(env)
+            part.cost = self._owner.short(part.cost + self.amount(env), leaf.span)
         else:
-            part.reward += self.amount(env)
+            part.reward = self._owner.short(part.reward + self.amount(env), leaf.span)
 
 
 _Leaf = _Setting | _Addition
@@ -388,6 +408,7 @@ class _Amounts:
                     first /= value
                 case _:
                     self._owner.report.error("BBT0410", "division by zero", amount.span)
+            first = self._owner.short(first, amount.span)
         return first
 
 

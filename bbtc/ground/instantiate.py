@@ -28,6 +28,7 @@ from bbtc.ground.usage import called
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.model import domain as md
+from bbtc.rounding import too_long
 
 
 def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
@@ -179,7 +180,7 @@ class _TaskBuilder:
     def _instances(self, schema: md.Schema, rows: list[Row]) -> list[gt.GroundAction]:
         """The actions of a schema with the given rows, which are used up."""
         conditions = self.lowering.reached(schema.precondition, schema.parameters)
-        effects = self.effects.reached(self.reached.usage.blocks[schema.name], schema.parameters)
+        effects = self.effects.reached(self.reached.usage.blocks[schema.name], schema.parameters, schema.span)
         unit, counts_cost = Fraction(1), self.model.counts_cost
         made: list[gt.GroundAction] = []
         for some in consumed(rows):
@@ -230,6 +231,9 @@ class _TaskBuilder:
             facts = {**self.begin.facts, **world} if world else self.begin.facts
             values = tuple(facts.get((each.predicate, each.args), Truth.FALSE) for each in variables)
             merged[values] = merged.get(values, Fraction(0)) + probability
+        if any(map(too_long, merged.values())):
+            message = "the probability of an initial state has too many digits"
+            self.report.error("BBT0113", message, self.model.problem_span)
         return tuple(gt.InitialState(probability, values) for values, probability in merged.items())
 
 
@@ -250,7 +254,7 @@ class _TemplateMaker:
                 lowering.condition(template.precondition, self.frame, strict=True),
                 None
                 if template.effect is None
-                else self.builder.effects.effect(normalise(template.effect), self.frame),
+                else self.builder.effects.effect(normalise(template.effect), self.frame, template.span),
                 self._body(template.body),
             )
         precondition, guide, body = self._compiled

@@ -36,7 +36,7 @@ class _Rows:
         used, frame = projection(lowering.universe, schema.parameters, reads(block))
         self.key = picker(used)
         # What is reported here is reported again when the actions are made.
-        self._effect = EffectLowering(lowering, Report()).effect(block, frame)
+        self._effect = EffectLowering(lowering, Report()).effect(block, frame, None)
         self._env = frame.env
         self._keys: dict[Row, None] = {}
         self.guarded = next(me.conditions(schema.effect), None) is not None

@@ -18,6 +18,8 @@ from bbtc.kleene import Truth
 from bbtc.model import effect as me
 
 Pairs: TypeAlias = tuple[Pair, ...]
+_FEW_BRANCHES = 8  # that are compared each with each, which is faster than to hash them
+
 Numbers = Callable[[list[Row]], "list[int | None]"]
 
 
@@ -114,6 +116,9 @@ def drawn(branches: list[tuple[Fraction, list[Pairs]]], *, oneof: bool) -> list[
     """For each row the factor that draws one of the branches, each given with its probability and what it
     sets in every row. None where branches come to the same: then they are to be merged."""
     made: list[tuple[Factor, ...] | None] = [*_factors(branches, oneof=oneof)]
+    if len(branches) > _FEW_BRANCHES:
+        rows = zip(*(sets for _, sets in branches), strict=True)
+        return [None if len({*row}) < len(row) else each for each, row in zip(made, rows, strict=True)]
     for (_, one), (_, other) in combinations(branches, 2):
         if any(map(eq, one, other)):
             made = [None if a == b else each for a, b, each in zip(one, other, made, strict=True)]

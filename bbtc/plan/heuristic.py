@@ -19,6 +19,7 @@ from bbtc.ground.task import Effect, Factor, Task
 from bbtc.kleene import Truth
 from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Cube, Packing, Words, bit_test, cubes
+from bbtc.rounding import rounded
 
 Costs = npt.NDArray[np.float32]
 """Guessed numbers of actions; infinite where the goal is out of reach for sure."""
@@ -52,7 +53,7 @@ class Heuristic:
         add(task.goal, (goal,), 0.0)
         for action in task.actions:
             for probability, effect in _effects(action.factors, Fraction(1)):
-                cost = min(_DEAREST, float(1 / probability))
+                cost = min(_DEAREST, rounded(1 / probability))
                 when = TRUE if effect.when is None else effect.when
                 condition = action.precondition if when == TRUE else And((action.precondition, when))
                 add(condition, tuple(self._adds(effect)), cost)

@@ -22,6 +22,7 @@ from bbtc.belief.state import Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth, negate
+from bbtc.rounding import LARGEST, rounded
 
 Costs: TypeAlias = npt.NDArray[np.float64]
 Index: TypeAlias = npt.NDArray[np.int64]
@@ -29,6 +30,7 @@ Index: TypeAlias = npt.NDArray[np.int64]
 _NEVER = float("inf")
 _KEPT_BYTES = 1 << 26
 _LEAST_COST = 2.0**-10
+_LEAST_PROBABILITY = 1 / LARGEST
 """What an action costs at least here, so that longer ways cost more."""
 
 
@@ -92,11 +94,12 @@ class RelaxedReachability:
         self._count = self._always + 2
         for number, action in enumerate(task.actions):
             needs = self._body(action.precondition)
-            cost = max(float(action.cost), _LEAST_COST)
+            cost = max(rounded(action.cost), _LEAST_COST)
             for operator in operators_of(number, action.factors):
                 more = [] if operator.when is None else self._body(operator.when)
                 heads = [3 * variable + int(value) for variable, value in operator.sets]
-                self._add(operator, cost / float(operator.probability), [*needs, *more], heads)
+                weight = cost / max(_LEAST_PROBABILITY, float(operator.probability))
+                self._add(operator, weight, [*needs, *more], heads)
         self._index()
 
     def _add(self, operator: Operator, cost: float, body: list[int], heads: Iterable[int]) -> None:

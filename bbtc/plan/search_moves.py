@@ -20,6 +20,7 @@ from bbtc.kleene import Truth
 from bbtc.plan.choose import circular
 from bbtc.plan.draft import Attempt, Draft, Subgoal
 from bbtc.plan.relaxed import Costs, Facts, RelaxedReachability, helpful
+from bbtc.rounding import rounded
 
 _MOST_STEPS = 200
 """Operators looked at in a relaxed plan."""
@@ -89,7 +90,7 @@ class Moves:
                 missing += facts.cost(each.condition)
         if attempt is None:
             return missing
-        own = float(attempt.doing.cost) if isinstance(attempt.doing, GroundAction) else 0.0
+        own = rounded(attempt.doing.cost) if isinstance(attempt.doing, GroundAction) else 0.0
         return missing + own + self._above(attempt.subgoal, draft, facts, values)
 
     def _for(self, subgoal: Subgoal, facts: Facts, costs: Costs, values: Values) -> Iterator[Insertion]:

@@ -19,6 +19,7 @@ from bbtc.plan.space_packing import Flags
 from bbtc.plan.value import Reachability, draw_probabilities
 from bbtc.plan.value_exact import solve
 from bbtc.plan.value_graph import Floats, Number, sums
+from bbtc.rounding import rounded
 
 _ZERO = Fraction(0)
 _MOST_EXACT = 100_000  # edges of a system that is solved in rationals
@@ -61,7 +62,7 @@ def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None
     policy = system.policy_from(values)
     exact = system.exact(policy, limits)
     if exact is not None:
-        values[system.states] = [float(value) for value in exact]
+        values[system.states] = [rounded(value) for value in exact]
         best = system.ties_exactly(exact, values)
         at = dict(zip(system.states.tolist(), exact, strict=True))
         initial = sum((p * at.get(s, _ZERO) for p, s in space.initial), _ZERO)
@@ -81,7 +82,7 @@ class _System:
         self.number[self.states] = np.arange(len(self.states))
         self.allowed = found.best & open_states[self.graph.choice_state]
         self.weight = draw_probabilities(self.space)
-        floats = np.array([float(cost) for cost in table])
+        floats = np.array([rounded(cost) for cost in table])
         weights = self.weight * floats[self.space.edge_draw]
         self.cost = sums(self.graph.edge_choice, weights, self.graph.choices)
 
@@ -151,7 +152,7 @@ class _System:
             if values is None:
                 return None
             floats = np.zeros(self.graph.states)
-            floats[self.states] = [float(value) for value in values]
+            floats[self.states] = [rounded(value) for value in values]
             gain: dict[int, tuple[Fraction, int]] = {}
             for choice in np.flatnonzero(self.ties(floats)).tolist():
                 state = int(self.number[self.graph.choice_state[choice]])

@@ -12,6 +12,7 @@ from bbtc.plan.space import StateSpace
 from bbtc.plan.space_packing import Flags
 from bbtc.plan.value import Bounds, draw_probabilities
 from bbtc.plan.value_graph import Floats, Graph, sums
+from bbtc.rounding import rounded
 
 _MOST_EXACT = 400_000  # edges times steps that are summed in rationals
 _UNIT = 2.0**-53
@@ -115,7 +116,7 @@ def cheapest_choices(horizon: Horizon, graph: Graph, best: list[Flags]) -> list[
     floats tell: cost only breaks ties)."""
     space = horizon.space
     weight = draw_probabilities(space)
-    table = np.array([float(draw.cost) for draw in space.draws] or [0.0])
+    table = np.array([rounded(draw.cost) for draw in space.draws] or [0.0])
     own = sums(graph.edge_choice, weight * table[space.edge_draw], graph.choices)
     cost = np.zeros(graph.states)
     found: list[Flags] = []

@@ -32,7 +32,7 @@ def difference(tree: Tree, form: str, limits: Limits, most: int = 200) -> str | 
 
     chain = explore(tree.task, tree.root, limits)
     replay = PyTreesReplay(tree) if form == "py_trees" else BtcppReplay(tree)
-    for number, scenario in enumerate(islice(scenarios(chain), most), 1):
+    for number, scenario in enumerate(islice(scenarios(chain, limits), most), 1):
         expected, script = run_of(scenario), script_of(scenario)
         for timing in TIMINGS:
             found = replay.run(script, timing)

@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.limits import Limits
+from bbtc.rounding import decimal
 from bbtc.tree.nodes import Tree
 from bbtc.verify import storm
 from bbtc.verify.chain import chain_of, solvable_chain
@@ -137,4 +138,4 @@ def _disagreement(message: str) -> Diagnostic:
 
 
 def _shown(value: Fraction) -> str:
-    return str(value) if value.denominator < _LONGEST else f"≈ {float(value):.12g}"
+    return str(value) if value.denominator < _LONGEST else f"≈ {decimal(value, 12)}"

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bbtc.artefacts.numbers import MAX_LENGTH, figure_text, given_text, parse_number
+from bbtc.artefacts.numbers import MAX_LENGTH, exact, figure_text, given_text, parse_number
 
 
 @pytest.mark.parametrize(
@@ -88,3 +88,19 @@ def test_anything_else_is_refused(text: str) -> None:
 def test_a_number_of_a_million_digits_is_refused_at_once() -> None:
     with pytest.raises(ValueError, match=r".+"):
         parse_number("1" * (MAX_LENGTH + 1))
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (Fraction(10**400), "≈ 1e+400"),
+        (Fraction(-25 * 10**399, 3), "≈ -8.33333e+399"),
+        (Fraction(1, 10**400), "≈ 1e-400"),
+        (Fraction(10**9000 + 1), "≈ 1e+9000"),
+        (Fraction(10**24), "1" + "0" * 24),
+        (Fraction(7, 8), "7/8 (0.875)"),
+        (Fraction(0), "0"),
+    ],
+)
+def test_numbers_for_people_may_be_beyond_all_floats(value: Fraction, text: str) -> None:
+    assert exact(value).replace("≈ ", "") == text.replace("≈ ", "")

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import islice
+
+import pytest
 
 from bbtc.belief.chain import explore
-from bbtc.belief.scenarios import scenarios
+from bbtc.belief.scenarios import sample, scenarios
+from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import TRUE, Is
 from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth
@@ -17,7 +21,7 @@ T = Truth.TRUE
 
 
 def probabilities(of: Task, root: Node) -> list[Fraction]:
-    return [run.probability for run in scenarios(explore(of, root, Limits()))]
+    return [run.probability for run in scenarios(explore(of, root, Limits()), Limits())]
 
 
 def two_facts(*actions: GroundAction) -> Task:
@@ -38,3 +42,17 @@ def test_runs_that_end_are_listed_where_others_go_on_for_ever() -> None:
     )
     root = ControlNode("n1", "fallback", (ConditionNode("n5", Is(0, T)), waiting, ActionNode("n6", "toss()")))
     assert probabilities(of, root) == [Fraction(1, 2)]
+
+
+def test_listing_and_sampling_end_at_the_limit() -> None:
+    of = two_facts(action("try", TRUE, ("1/4", {0: T}), ("3/4", {})))
+    root = ControlNode(
+        "n1", "fallback", (ConditionNode("n2", Is(0, T)), ActionNode("n3", "try()", latched=False))
+    )
+    chain = explore(of, root, Limits())
+    runs = scenarios(chain, Limits(states=100))
+    assert [len(run.steps) for run in islice(runs, 3)] == [1, 2, 3]
+    with pytest.raises(LimitReached, match="the limit of 100 states ended the listing of runs"):
+        list(runs)
+    with pytest.raises(LimitReached, match="sampling"):
+        sample(chain, 10**9, 0, Limits(seconds=0.2))

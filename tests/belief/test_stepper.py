@@ -33,7 +33,7 @@ def test_taking_the_outcomes_of_a_scenario_gives_that_scenario(tree: Tree) -> No
     except LimitReached:
         assume(False)
     stepper = Stepper(tree.task, tree.root)
-    for run in itertools.islice(scenarios(chain), 8):
+    for run in itertools.islice(scenarios(chain, Limits()), 8):
         stepper.start(place(stepper.starts, run.initial))
         probability = stepper.starts[place(stepper.starts, run.initial)].probability
         for step in run.steps:

@@ -153,3 +153,54 @@ def test_an_action_of_very_many_outcomes_ends_at_the_limit(
     done = _run(command[0], str(drawing), *command[1:], limit)
     assert done.returncode == 3
     assert f"raise it with {limit.partition('=')[0]}" in done.stderr
+
+
+def test_very_many_branches_take_time_in_proportion(tmp_path: Path) -> None:
+    file = tmp_path / "branches.pddl"
+    branches = " ".join(["1/30000 (done)"] * 30_000)
+    file.write_text(
+        f"(define (domain d) (:predicates (done)) (:action a :effect (probabilistic {branches})))"
+        "(define (problem p) (:domain d) (:init) (:goal (done)))"
+    )
+    assert _run("compile", str(file), "-o", str(tmp_path / "task.json")).returncode == 0
+
+
+@pytest.mark.parametrize("digits", [4001, 99_000])
+def test_a_task_of_very_long_numbers_is_refused(drawing: Path, digits: int) -> None:
+    text = (drawing.parent / "task.json").read_text()
+    for old, field in (('"cost": "1"', "cost"), ('"p": "0.5"', "p")):
+        long = drawing.parent / f"{field}.json"
+        long.write_text(text.replace(old, f'"{field}": "0.{"4" * digits}"', 1))
+        done = _run("plan", str(long))
+        assert done.returncode == 1
+        assert "has too many digits" in done.stderr
+
+
+def test_numbers_beyond_all_floats_are_planned_with_and_shown(tmp_path: Path) -> None:
+    cost, p = "1" + "0" * 1789, "0." + "0" * 1789 + "1"
+    rest = "0." + "9" * 1790
+    effect = {"when": None, "set": {"g()": "true"}}
+    action: dict[str, object] = {
+        "name": "a()",
+        "schema": "a",
+        "args": [],
+        "cost": cost,
+        "precondition": ["true"],
+    }
+    action["outcomes"] = [{"p": p, "effects": [effect]}, {"p": rest, "effects": []}]
+    task = {
+        "format": "bbtc-task", "version": 1, "domain": "d", "problem": "p", "goal_probability": p,
+        "variables": [{"name": "g()", "values": ["true", "false"], "hidden": False}],
+        "initial": [{"p": "1", "assign": {"g()": "false"}}],
+        "goal": ["is", "g()", "true"], "actions": [action],
+    }  # fmt: skip
+    file, tree = tmp_path / "task.json", tmp_path / "tree.json"
+    file.write_text(json.dumps(task))
+    for strategy in ("policy", "search", "auto", "refine"):
+        # What is below all floats, searches in floats may miss.
+        assert _run("plan", str(file), "--strategy", strategy, "-q", "-o", str(tree)).returncode in {0, 3}
+    assert "e+" in _run("simulate", str(tree)).stdout
+    for command in (["verify", "--engine", "own"], ["run", "--batch"], ["diff", str(tree)]):
+        assert _run(command[0], str(tree), *command[1:]).returncode == 0
+    for form in ("btcpp", "py_trees", "prism", "jani", "svg"):
+        assert _run("export", str(tree), "--to", form, "-o", str(tmp_path / form)).returncode == 0

@@ -65,7 +65,7 @@ def figures(domain: str) -> str:
     for problem in PROBLEMS:
         if problem.domain == domain:
             made = plan_of(problem)
-            runs = scenarios(explore(made.tree.task, made.tree.root, Limits()))
+            runs = scenarios(explore(made.tree.task, made.tree.root, Limits()), Limits())
             count = sum(1 for _ in itertools.islice(runs, 500))
             cells = [
                 f"[{problem.name}](../../{problem.files[1]})",

@@ -25,7 +25,7 @@ def test_every_scenario_runs_as_simulated(
     problem: Problem, name: EngineName, record_property: Callable[[str, object], None]
 ) -> None:
     tree = plan_of(problem).tree
-    runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits())), MOST))
+    runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits()), Limits()), MOST))
     assert runs
     assert len(runs) == MOST or sum(run.probability for run in runs) == 1
     scripts, expected = [script_of(run) for run in runs], [run_of(run) for run in runs]

@@ -270,3 +270,30 @@ def test_an_object_outside_the_declared_type_of_a_predicate_stays_outside_that_o
         (define (problem x) (:domain d) (:init) (:goal (and (q a) (forall (?x) (p ?x)))))"""
     )
     assert [action.name for action in task.actions] == ["any(a)", "any(b)", "few(a)"]
+
+
+_LONG = "0." + "7" * 190
+
+
+def _nested(levels: int) -> str:
+    return f"(probabilistic {_LONG} " * levels + "(p)" + ")" * levels
+
+
+@pytest.mark.parametrize(
+    ("effect", "metric"),
+    [
+        (_nested(60), ""),
+        (f"(probabilistic {' '.join(f'1/{10**190 + n} (p)' for n in range(60))})", ""),
+        (f"(and (p) (increase (total-cost) {f'(* {10**190} ' * 80} 2 {')' * 80}))", "cost"),
+        ("(and (p) (increase (total-cost) 1e300) " + "(increase (total-cost) 1e-300)" * 2 + ")", ""),
+        (f"(and (p) {' '.join(f'(increase (total-cost) 1/{10**190 + n})' for n in range(60))})", "cost"),
+    ],
+)
+def test_numbers_whose_exact_value_grows_without_bound_are_refused(effect: str, metric: str) -> None:
+    if "1e300" in effect:
+        assert _only(_task(effect)).factors  # long, but not too long
+        return
+    with pytest.raises(BbtcError) as caught:
+        _task(effect, metric="(:metric minimize (total-cost))" if metric else "")
+    assert {diagnostic.code for diagnostic in caught.value.diagnostics} == {"BBT0113"}
+    assert all(diagnostic.span is not None for diagnostic in caught.value.diagnostics)

@@ -58,7 +58,7 @@ def test_random_trees_run_as_in_the_reference(engine: type[CompiledReplay], latc
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_scenarios_run_as_simulated(problem: Problem, engine: type[CompiledReplay]) -> None:
     tree = plan_of(problem).tree
-    runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits())), MOST))
+    runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits()), Limits()), MOST))
     with engine(tree) as replay:
         for scenario, timing in itertools.product(runs, TIMINGS):
             assert replay.run(script_of(scenario), timing) == run_of(scenario), (timing, scenario)

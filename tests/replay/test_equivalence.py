@@ -39,7 +39,7 @@ def lively_trees(chunk: int) -> Iterator[tuple[int, Tree, list[Scenario]]]:
     found = 0
     for seed in itertools.count(chunk, CHUNKS):
         tree = busy_tree(seed, starts=3)
-        runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits())), MOST))
+        runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits()), Limits()), MOST))
         if max(len(run.steps) for run in runs) >= 3:
             yield seed, tree, runs
             found += 1
