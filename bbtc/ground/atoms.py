@@ -85,33 +85,35 @@ class Atoms:
         """The condition that an atom has the value (None: is known), for every atom that may be
         something else than false, and the condition for all others.
 
-        It is constant where it is always or never so. Where only truth matters (``strict``), a
-        literal that can never be true is false, even if it can be unknown.
+        It is constant where it is always or never so, also of an atom whose variable is not kept.
+        Where only truth matters (``strict``), a literal that can never be true is false, even if it
+        can be unknown.
         """
         key = (predicate, value, strict)
         if key not in self._tables:
             numbers = self.numbers[predicate]
             if value is not None and value not in self._is:
                 self._is[value] = [Is(number, value) for number in range(len(self.keys))]
-            self._tables[key] = {
-                row: self._leaf(numbers.get(row), values, value, strict)
+            leaves = (
+                (row, self._leaf(numbers.get(row), values, value, strict))
                 for row, values in self._possible[predicate].items()
-                if row in numbers or (values[0] is not Truth.UNKNOWN and len(values) == 1)
-            }
+            )
+            self._tables[key] = {row: leaf for row, leaf in leaves if leaf is not None}
         return self._tables[key], TRUE if value in {Truth.FALSE, None} else FALSE
 
     def _leaf(
         self, number: int | None, values: tuple[Truth, ...], value: Truth | None, strict: bool
-    ) -> Condition:
+    ) -> Condition | None:
+        """None where the variable matters and is not kept."""
         if value is None:
             if Truth.UNKNOWN not in values:
                 return TRUE
-            assert number is not None
-            return FALSE if len(values) == 1 else Known(number)
+            if len(values) == 1:
+                return FALSE
+            return None if number is None else Known(number)
         if values == (value,):
             return TRUE
         # A literal that can never be true may still be unknown, which matters unless strict.
         if value not in values and (strict or value is Truth.UNKNOWN or Truth.UNKNOWN not in values):
             return FALSE
-        assert number is not None
-        return self._is[value][number]
+        return None if number is None else self._is[value][number]

@@ -85,7 +85,7 @@ class ProgramBuilder:
             number, arity = self.number[name], len(predicate.parameters)
             lines.extend(_fact(f"t{number}", row) for row in start.true.get(name, ()))
             lines.extend(_fact(f"u{number}", row) for row in start.unknown.get(name, ()))
-            if f"f{number}" in self._asked:
+            if name in self._asked:
                 lines.extend(_fact(f"n{number}", row) for row in start.never_false.get(name, ()))
             if not self.usage.is_static(name) or name in self.usage.derived:
                 outputs.update({f"{letter}{number}": arity for letter in LETTER.values()})
@@ -269,10 +269,12 @@ class ProgramBuilder:
                 yield f"{self._term(left)}!={self._term(right)}"
             case mf.Not(mf.Atom(predicate, args)):
                 # Whether a changing derived atom can be false is not traced: it may be.
-                if self.usage.is_static(predicate):
+                if not self.usage.is_static(predicate):
+                    return
+                if predicate in self.usage.uncertain:
+                    yield self._false_at_first(predicate, args)
+                else:
                     yield "not " + self._call(f"t{self.number[predicate]}", args)
-                    if self.usage.can_be_unknown(predicate):
-                        yield "not " + self._call(f"u{self.number[predicate]}", args)
             case mf.Test("unknown", atom):
                 if self.usage.can_be_unknown(atom.predicate):
                     yield self._call(f"u{self.number[atom.predicate]}", atom.args)
@@ -318,11 +320,14 @@ class ProgramBuilder:
         return fresh, mf.substitute(part.part, {parameter.name: name})
 
     def _can_be_false(self, predicate: str, args: tuple[mf.Term, ...], context: list[str]) -> str:
-        number = self.number[predicate]
-        self._asked.add(f"f{number}")
-        literal = self._call(f"f{number}", args)
-        self._rule(literal, [*context, "not " + self._call(f"n{number}", args)])
+        literal = self._call(f"f{self.number[predicate]}", args)
+        self._rule(literal, [*context, self._false_at_first(predicate, args)])
         return literal
+
+    def _false_at_first(self, predicate: str, args: tuple[mf.Term, ...]) -> str:
+        """That the atom is false in some initial state."""
+        self._asked.add(predicate)
+        return "not " + self._call(f"n{self.number[predicate]}", args)
 
     def _any(self, parts: Iterable[mf.Formula], whole: mf.Formula, context: list[str]) -> str:
         head = _written(self._fresh(), map(_variable, free(whole)))

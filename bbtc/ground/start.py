@@ -121,10 +121,15 @@ def _product(draws: list[list[tuple[Fraction, World]]], limit: int) -> list[tupl
     for draw in draws:
         if len(result) * len(draw) > 4 * limit:
             raise _TooMany
-        result = _merged([(p * q, {**world, **more}) for p, world in result for q, more in draw])
+        result = _merged([(p * q, _both(world, more)) for p, world in result for q, more in draw])
         if len(result) > limit:
             raise _TooMany
     return result
+
+
+def _both(one: World, other: World) -> World:
+    """What two draws say together: as in effects, the greater value wins, whatever their order."""
+    return {**one, **{atom: max(value, one.get(atom, value)) for atom, value in other.items()}}
 
 
 def _merged(draws: list[tuple[Fraction, World]]) -> list[tuple[Fraction, World]]:

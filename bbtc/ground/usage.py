@@ -23,6 +23,13 @@ class Start:
     unknown: dict[str, list[Row]]
     never_false: dict[str, list[Row]]
 
+    def uncertain(self) -> set[str]:
+        """Predicates of which some atom is unknown, or differs between initial states."""
+        # What is true in some state and false in none stands in both lists, in the same order.
+        named = {*self.true, *self.never_false}
+        differing = {name for name in named if self.true.get(name) != self.never_false.get(name)}
+        return {*self.unknown, *differing}
+
 
 class Usage:
     """Facts about the predicates of a model with its initial states, for the stages of grounding."""
@@ -37,12 +44,13 @@ class Usage:
                 if isinstance(item.leaf, me.Set):
                     self.set_values.setdefault(item.leaf.predicate, set()).add(item.leaf.value)
         self.derived = {rule.predicate for rule in model.rules}
+        self.uncertain = start.uncertain()
         self.unchanging = self._unchanging()
         self.loose = self._loose()
 
     def is_static(self, predicate: str) -> bool:
-        """Whether no action changes the predicate; true of derived ones, too, where nothing they
-        read changes or is unknown."""
+        """Whether no action changes the predicate (initial states may differ in it); true of derived
+        ones, too, where nothing they read changes or is uncertain."""
         if predicate in self.derived:
             return predicate in self.unchanging
         return predicate not in self.set_values
@@ -54,7 +62,7 @@ class Usage:
         return Truth.UNKNOWN in self.set_values.get(predicate, ()) or bool(self.start.unknown.get(predicate))
 
     def _unchanging(self) -> set[str]:
-        """Derived predicates that only read, all the way down, what never changes nor is unknown."""
+        """Derived predicates that only read, all the way down, what never changes and is certain."""
         found = set(self.derived)
         shrunk = True
         while shrunk:
@@ -63,7 +71,7 @@ class Usage:
                 if rule.predicate in found and not all(
                     atom.predicate in found
                     if atom.predicate in self.derived
-                    else self.is_static(atom.predicate) and not self.start.unknown.get(atom.predicate)
+                    else self.is_static(atom.predicate) and atom.predicate not in self.uncertain
                     for atom in mf.atoms(rule.condition)
                 ):
                     found.discard(rule.predicate)

@@ -11,10 +11,13 @@ from hypothesis import strategies as st
 from bbtc.diagnostics import BbtcError, LimitReached, Report
 from bbtc.ground.condition import evaluate
 from bbtc.ground.describe import describe
-from bbtc.ground.instantiate import ground
+from bbtc.ground.instantiate import ground, instantiate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.plan.space import explore_space
+from bbtc.plan.value import reachability
+from bbtc.plan.value_cost import least_cost
 from tests.ground.examples import model_of, task_of
 
 _DOMAIN = """(define (domain d) (:types t) (:predicates (p ?x - t) (q) (r) (on ?x ?y - t) (above ?x ?y - t))
@@ -113,6 +116,74 @@ def test_a_probabilistic_start_is_spelled_out() -> None:
         ("on(a,b)",): Fraction(1, 8),
         ("on(a,b)", "p(a)"): Fraction(1, 8),
     }
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("(probabilistic 0.5 (q))", "(probabilistic 0.5 (not (q)))"),
+        ("(probabilistic 0.5 (q))", "(probabilistic 1 (unknown (q)))"),
+        ("(forall (?x - t) (probabilistic 0.5 (p ?x)))", "(probabilistic 0.25 (not (p a)) 0.75 (p b))"),
+    ],
+)
+def test_the_order_of_draws_at_the_start_does_not_matter(first: str, second: str) -> None:
+    """Where two of them set a fact, the greater value stays, as in effects."""
+
+    def start(init: str) -> dict[tuple[Truth, ...], Fraction]:
+        task = instantiate(model_of(_text(init, "(p c)")), Report(), Limits())
+        return {state.values: state.probability for state in task.initial}
+
+    assert start(f"{first} {second}") == start(f"{second} {first}")
+
+
+def test_of_two_values_in_one_draw_the_greater_stays() -> None:
+    states = _task("(probabilistic 0.3 (and (q) (not (q))))", "(q)").initial
+    assert {state.values: state.probability for state in states} == {
+        (Truth.TRUE,): Fraction(3, 10),
+        (Truth.FALSE,): Fraction(7, 10),
+    }
+
+
+_TWO_CHANCES = """(define (domain d) (:types t) (:predicates (g) (w) (h) (k) (s ?x - t)) (:constants a b - t)
+  (:derived (k) (or (h) (exists (?x - t) (s ?x))))
+  (:action try :effect (probabilistic 1/2 (w)))
+  (:action blur :effect (unknown (s b)))
+  (:action go :precondition {condition} :effect (g)))
+  (define (problem x) (:domain d) (:init {init}) (:goal (g)))"""
+
+
+@pytest.mark.parametrize(
+    ("init", "condition", "best", "cost"),
+    [
+        # Nothing changes h, but it is true in some initial states only.
+        ("(probabilistic 1/3 (h))", "(h)", "1/3", "1/3"),
+        ("(probabilistic 1/3 (h))", "(not (h))", "2/3", "2/3"),
+        ("(probabilistic 1/3 (h))", "(forall (?x - t) (not (h)))", "2/3", "2/3"),
+        ("(probabilistic 1/3 (unknown (h)))", "(not (h))", "2/3", "2/3"),
+        ("(h) (probabilistic 1/3 (not (h)))", "(not (h))", "1/3", "1/3"),
+        ("(probabilistic 1/3 (s a))", "(forall (?x - t) (not (s ?x)))", "2/3", "2/3"),
+        # Nor does anything change what derives from it.
+        ("(probabilistic 1/3 (h))", "(k)", "1/3", "1/3"),
+        ("(probabilistic 1/3 (h))", "(not (k))", "2/3", "2/3"),
+        # h is never known, s(a) never true: as constants they are still what they are.
+        ("(unknown (h))", "(unknown (h))", "1", "1"),
+        ("(unknown (h))", "(or (known (h)) (w))", "1", "3"),
+        ("(unknown (h))", "(or (not (h)) (w))", "1", "3"),
+        ("(unknown (h))", "(or (h) (w))", "1", "3"),
+        ("(unknown (h))", "(or (not (k)) (w))", "1", "3"),
+        ("(unknown (s a))", "(or (exists (?x - t) (known (s ?x))) (w))", "1", "1"),
+        ("(unknown (s a)) (s b)", "(or (exists (?x - t) (not (s ?x))) (w))", "1", "3"),
+    ],
+)
+def test_what_no_action_changes_has_the_value_it_starts_with(
+    init: str, condition: str, best: str, cost: str
+) -> None:
+    task = task_of(_TWO_CHANCES.format(init=init, condition=condition))
+    found = reachability(explore_space(task, Limits()), Limits())
+    cheapest = least_cost(found, Limits())
+    assert found.initial.exact == Fraction(best)
+    assert cheapest is not None
+    assert cheapest.initial == Fraction(cost)
 
 
 @pytest.mark.parametrize(
