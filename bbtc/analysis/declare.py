@@ -191,16 +191,18 @@ def _functions(names: Names, domain: ast.Definition) -> None:
 
 def _fluents(names: Names, problem: ast.Definition | None) -> None:
     """The fluents that count cost and reward: ``total-cost`` and ``reward``, and the one a metric
-    minimises or maximises."""
-    costs, rewards = set(names.costs), set(names.rewards)
+    minimises or maximises, which then counts in their place."""
+    costs, rewards, counted = set(names.costs), set(names.rewards), set(names.counted)
     for metric in sections(problem, ast.Metric) if problem is not None else ():
         if isinstance(metric.expression, ast.FluentRef) and not metric.expression.args:
             key = metric.expression.name.key
             if metric.direction == "minimize" and key not in rewards and key != "total-time":
+                counted = (counted - costs) | {key}
                 costs.add(key)
             elif metric.direction == "maximize" and key not in costs:
+                counted = (counted - rewards) | {key}
                 rewards.add(key)
-    names.costs, names.rewards = frozenset(costs), frozenset(rewards)
+    names.costs, names.rewards, names.counted = frozenset(costs), frozenset(rewards), frozenset(counted)
 
 
 def _actions(names: Names, nodes: list[ast.Action]) -> None:

@@ -229,7 +229,7 @@ def _fluent_effect(names: Names, node: ast.FluentEffect, scope: Scope) -> me.Eff
         )
         return me.NOTHING
     found = amount(names, node.amount, scope)
-    if found is None:
+    if found is None or key not in names.counted:
         return me.NOTHING
     sign = 1 if node.operator == "increase" else -1
     return me.Add("cost" if to == "cost" else "reward", found, sign, node.span)

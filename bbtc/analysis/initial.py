@@ -12,6 +12,7 @@ from bbtc.diagnostics import Related
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.source import Span
 from bbtc.syntax import ast
 
 
@@ -35,6 +36,7 @@ class _Reader:
         self.names = names
         self.facts: dict[tuple[str, tuple[str, ...]], md.InitialFact] = {}
         self.numbers: dict[tuple[str, tuple[str, ...]], Fraction] = {}
+        self.places: dict[tuple[str, tuple[str, ...]], Span] = {}
         self.choices: list[me.Effect] = []
         self.clauses: list[md.InitialClause] = []
 
@@ -92,5 +94,14 @@ class _Reader:
                 names.unknown("BBT0220", "function", fluent.name, names.functions)
             return
         args = names.arguments("function", fluent.name, function, fluent.args, {}, span=fluent.span)
-        if args is not None:
-            self.numbers[fluent.name.key, args] = value.value
+        if args is None:
+            return
+        key = (fluent.name.key, args)
+        first = self.places.setdefault(key, fluent.span)
+        if self.numbers.setdefault(key, value.value) != value.value:
+            names.report.error(
+                "BBT0223",
+                f"`{fluent.span.text}` is given two values at the start",
+                fluent.span,
+                related=[Related(f"first given as {self.numbers[key]} here", first)],
+            )

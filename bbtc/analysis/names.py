@@ -72,6 +72,8 @@ class Names:
     templates: dict[str, Signature] = field(default_factory=dict)
     costs: frozenset[str] = frozenset({"total-cost"})
     rewards: frozenset[str] = frozenset({"reward"})
+    counted: frozenset[str] = frozenset({"total-cost", "reward"})
+    """Those of both that count: the one that a metric names takes the place of its like."""
     section: str = ""
     definitions: tuple[ast.Definition, ...] = ()
     derived: frozenset[str] = frozenset()

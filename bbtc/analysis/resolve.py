@@ -235,7 +235,7 @@ def _sensor(names: Names, node: ast.Sensor) -> md.Sensor:
 
 
 def _counts_cost(names: Names, schemas: dict[str, md.Schema]) -> bool:
-    if not names.costs.isdisjoint(names.functions):
+    if not (names.costs & names.counted).isdisjoint(names.functions):
         return True
     added = (leaf for schema in schemas.values() for leaf in me.leaves(schema.effect))
     return any(isinstance(leaf, me.Add) and leaf.to == "cost" for leaf in added)
@@ -368,7 +368,7 @@ def _check_metric(names: Names, metric: ast.Metric) -> None:
     expression = metric.expression
     if isinstance(expression, ast.FluentRef) and not expression.args:
         key = expression.name.key
-        if key in names.costs or key in names.rewards:
+        if key in (names.costs if metric.direction == "minimize" else names.rewards):
             if key not in names.functions and key not in ("total-cost", "reward"):
                 names.unknown("BBT0220", "function", expression.name, names.functions)
             return

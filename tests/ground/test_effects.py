@@ -160,6 +160,26 @@ def test_rewards_are_kept_by_outcome() -> None:
     assert [outcome.reward for outcome in factor.outcomes] == [5, -1]
 
 
+@pytest.mark.parametrize(
+    ("metric", "cost", "reward"),
+    [
+        ("", "5", "7"),
+        ("(:metric minimize (total-cost))", "5", "7"),
+        ("(:metric minimize (fuel))", "2", "7"),
+        ("(:metric minimize (length))", "0", "7"),
+        ("(:metric maximize (joy))", "5", "3"),
+    ],
+)
+def test_only_the_fluent_that_the_metric_names_counts(metric: str, cost: str, reward: str) -> None:
+    other = next((f"(increase ({name}) {n})" for name, n in (("fuel", 2), ("joy", 3)) if name in metric), "")
+    text = f"""(define (domain d) (:predicates (p)) (:functions (total-cost) (fuel) (joy) (length))
+      (:action go :effect (and (p) (increase (total-cost) 5) (increase (reward) 7) {other})))
+      (define (problem x) (:domain d) (:init) (:goal (p)) {metric})"""
+    (action,) = task_of(text).actions
+    (outcome,) = action.factors[0].outcomes
+    assert (action.cost, outcome.reward) == (Fraction(cost), Fraction(reward))
+
+
 def test_a_cost_under_a_condition_is_refused_with_its_place() -> None:
     with pytest.raises(BbtcError) as caught:
         _task("(and (p) (not (q)) (when (q) (increase (total-cost) 1)))", "(q)")
