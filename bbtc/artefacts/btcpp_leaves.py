@@ -114,7 +114,9 @@ class Leaves:
         for port in wanted:
             if port not in given:
                 message = f"'{clip(tag_of(element))}' needs the port '{port}'"
-                raise unreadable(self._document, element, "BBT0603", message)
+                other = next((key for key in given if key not in wanted), None)
+                hint = f"it has no port '{clip(other)}'" if other is not None else None
+                raise unreadable(self._document, element, "BBT0603", message, attribute=other, hint=hint)
         for port in given:
             if port not in wanted:
                 message = f"'{clip(tag_of(element))}' has no port '{clip(port)}'"

@@ -261,6 +261,14 @@ def test_wrong_usage_is_status_2(folder: Path, arguments: list[str]) -> None:
     assert (folder / "out.json").read_text() == "as it was"
 
 
+def test_a_misspelt_command_is_told_what_is_meant(folder: Path) -> None:
+    done = bbtc("plna", "domain.pddl", folder=folder)
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (
+        2,
+        "Error: No such command 'plna'. Did you mean 'plan'?",
+    )
+
+
 def test_a_limit_is_status_3_and_writes_the_best_tree(folder: Path) -> None:
     limited = ["--strategy", "refine", "--max-nodes", "26", "-o", "out.json"]
     done = bbtc("plan", "domain.pddl", "problem.pddl", *limited, folder=folder)

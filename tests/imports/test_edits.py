@@ -164,6 +164,7 @@ ATTEMPT = '<ScriptCondition code="@x &gt; 0" /><Script code="@x -= 1" />'
         ('<Seen arg="soda" />', '<Seen arg="cola" />', "BBT0606", 'arg="cola"'),
         ('<Seen arg="soda" />', '<Seen arg="{item}" />', "BBT0606", 'arg="{item}"'),
         ('<Seen arg="soda" />', "<Seen />", "BBT0603", "<Seen />"),
+        ('<Seen arg="soda" />', '<Seen item="soda" />', "BBT0603", 'item="soda"'),
         ('<Seen arg="soda" />', '<Seen arg="soda" x="1" />', "BBT0603", 'x="1"'),
         ('<Seen arg="soda" />', '<Seen arg="soda" _skipIf="true" />', "BBT0616", '_skipIf="true"'),
         ('<Seen arg="soda" />', '<Inverter><Detect arg="soda" /></Inverter>', "BBT0606", "<Detect"),
