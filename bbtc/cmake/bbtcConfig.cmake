@@ -11,7 +11,7 @@
 #     [EXPORTS <format>=<file> ...]    # default: btcpp=<name>.xml btcpp_palette=<name>_nodes.xml
 #     [CPP]                            # the leaves and the interface of the robot, in C++, too
 #     [NODES stock|bbtc]               # as `bbtc export --to btcpp -O nodes=...`
-#     [NAMESPACE <name>]               # and -O namespace=...; several trees of one program need it
+#     [NAMESPACE <name>]               # and -O namespace=...; with CPP, several trees of a program need it
 #     [PLAN_OPTIONS <option> ...]      # more options of `bbtc plan`
 #     [OUTPUT_DIRECTORY <directory>])  # default: the current binary directory
 #

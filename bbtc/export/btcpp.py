@@ -94,8 +94,9 @@ class _Writer:
         self.task: Task = tree.task
         self.names = btcpp_names(tree, namespace)
         self.profile: Profile = profile
-        self.idioms = Idioms(profile, entry_prefix(namespace))
-        self.tree_ids = TreeIds(self.names)
+        self.tree_ids = TreeIds(self.names, self.task.problem)
+        prefix = entry_prefix(namespace)
+        self.idioms = Idioms(profile, prefix, f"{prefix}{entry_prefix(self.task.problem)}")
         self.order: Iterator[int] = itertools.count()
         self.parts: dict[bytes, tuple[int, Element]] = {}
         self.action_trees: dict[tuple[str, bytes], Element] = {}
@@ -105,7 +106,7 @@ class _Writer:
 
     def document(self, model: bool, with_notes: bool) -> Element:
         """The whole document."""
-        main_id = self.tree_ids.take(self.task.problem, seed=self.task.problem)
+        main_id = self.tree_ids.main
         document = Element("root", BTCPP_format="4", main_tree_to_execute=main_id)
         main = SubElement(document, "BehaviorTree", ID=main_id)
         main.set("_description", self._headline())

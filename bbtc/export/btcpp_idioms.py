@@ -32,11 +32,12 @@ WHEN_READY_LABEL = "start when ready"
 
 @dataclass(frozen=True, slots=True)
 class Idioms:
-    """Writes nodes in one profile. ``prefix`` comes before the names of entries of the root
-    blackboard."""
+    """Writes nodes in one profile. ``prefix`` comes before the names of entries of the root blackboard,
+    ``own`` before those of entries that must outlive a tick: other trees may have that blackboard, too."""
 
     profile: Profile = "stock"
     prefix: str = ""
+    own: str = ""
 
     @property
     def acting(self) -> str:
@@ -45,7 +46,7 @@ class Idioms:
 
     def counter(self, number: int) -> str:
         """The entry that counts the attempts a retry node has left."""
-        return f"@{self.prefix}attempts_left_{number}"
+        return f"@{self.own}attempts_left_{number}"
 
     # --- control nodes -----------------------------------------------------------------------
 

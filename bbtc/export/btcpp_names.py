@@ -65,15 +65,19 @@ def _reserved(prefix: str) -> set[str]:
 
 
 class TreeIds:
-    """Hands out ids of BehaviorTrees, all different from one another and from those of leaves."""
+    """Hands out ids of BehaviorTrees, all different from one another and from those of leaves. All but that
+    of the main tree, :attr:`main`, begin with it: a factory that reads a second file with a BehaviorTree of
+    the same id puts that in the place of the first, without a word."""
 
-    def __init__(self, names: BtcppNames) -> None:
+    def __init__(self, names: BtcppNames, problem: str) -> None:
         self._prefix = names.namespace
         self._namer = Namer({*_reserved(self._prefix), *names.plain.values()})
+        self._main = self._namer.take(camel(problem), seed=problem)
+        self.main = f"{self._prefix}{self._main}"
 
     def take(self, title: str, seed: str) -> str:
-        """The title with the namespace in front, if it is free; otherwise with a digest of ``seed``."""
-        return self._prefix + self._namer.take(camel(title), seed=seed)
+        """An id that ends in the title, if it is free; otherwise in a digest of ``seed``."""
+        return self._prefix + self._namer.take(f"{self._main}_{camel(title)}", seed=seed)
 
 
 def ports_for(uses: Iterable[tuple[str, str]]) -> dict[str, str]:

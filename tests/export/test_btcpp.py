@@ -158,9 +158,9 @@ def trees_called(text: str, name: str) -> list[str]:
 def test_expansions_of_a_template_share_a_tree_with_its_arguments_as_ports(nodes: str) -> None:
     text = export(templated("look(a)", "look(b)", "look(a)"), nodes=nodes)
     check_form(text)
-    assert trees_called(text, "Look") == ["Look"]
+    assert trees_called(text, "Look") == ["P_Look"]
     main = ET.fromstring(text)[0]
-    calls = [call.attrib for call in main.iter("SubTree") if call.attrib["ID"] == "Look"]
+    calls = [call.attrib for call in main.iter("SubTree") if call.attrib["ID"] == "P_Look"]
     assert [(call["name"], call["arg"]) for call in calls] == [
         ("look(a)", "a"),
         ("look(b)", "b"),
@@ -173,6 +173,24 @@ def test_expansions_that_differ_in_more_than_arguments_have_trees_of_their_own()
     text = export(templated("look(a)", "look(?b)"))
     check_form(text)
     assert len(trees_called(text, "Look")) == 2
+
+
+@pytest.mark.parametrize("nodes", ["stock", "bbtc"])
+@pytest.mark.parametrize("seed", range(20))
+def test_trees_of_several_problems_fit_into_one_program_and_share_its_leaves(seed: int, nodes: str) -> None:
+    # Of two BehaviorTrees of one id, a factory keeps the later one, without a word.
+    trees_made, entries = [], []
+    for number, problem in enumerate(("fetch", "fetch-all")):
+        tree = random_tree(2 * seed + number)
+        text = export(replace(tree, task=replace(tree.task, problem=problem)), nodes=nodes)
+        root = check_form(text)
+        trees_made.append({each.attrib["ID"] for each in root.iter("BehaviorTree")})
+        entries.append(set(re.findall(r"@\w+", text)) - {"@acting"})  # set anew in every tick
+        model = root.find("TreeNodesModel")
+        assert model is not None
+        assert not any(leaf.attrib["ID"].startswith("Fetch") for leaf in model if leaf.tag != "SubTree")
+    assert not trees_made[0] & trees_made[1]
+    assert not entries[0] & entries[1]
 
 
 def test_a_namespace_comes_before_every_id_and_entry() -> None:

@@ -56,7 +56,7 @@ STOCK, OURS = exported(soda_tree()), exported(soda_tree(), nodes="bbtc")
 
 
 def test_a_condition_added_by_hand_is_read_and_the_other_nodes_keep_their_ids() -> None:
-    known = '<SubTree ID="KnownSeen"'
+    known = '<SubTree ID="LookForSoda_KnownSeen"'
     edited = swap(OURS, known, f"<Inverter><LuminousityOk /></Inverter>{known}")
     tree, before = read(edited), soda_tree()
     old, new = list(walk(before.root)), list(walk(tree.root))
@@ -70,7 +70,7 @@ def test_a_condition_added_by_hand_is_read_and_the_other_nodes_keep_their_ids() 
 @pytest.mark.parametrize("text", [STOCK, OURS], ids=["stock", "bbtc"])
 def test_an_action_removed_by_hand_changes_the_figures(text: str) -> None:
     found = re.search(
-        r" *<(SubTree ID=\"LightOnOnce\"|Latch name=\"light_on)[^>]*>(?:\s*<LightOn />\s*</Latch>)?", text
+        r" *<(SubTree ID=\"\w+_LightOnOnce\"|Latch name=\"light_on)[^>]*>(?:\s*<LightOn />\s*</Latch>)?", text
     )
     assert found is not None
     report = Report()
