@@ -91,9 +91,10 @@ def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
 def check_documents(documents: Iterable[Document], report: Report) -> None:
     """Everything that is wrong or doubtful in domains and problems, to the report. Each problem is checked
     with the domain of its name; what rests on one problem is a warning only where it holds for all of
-    its domain's."""
+    its domain's. What is right but cannot be grounded is noted."""
     from bbtc.analysis.check import check
     from bbtc.analysis.resolve import resolve
+    from bbtc.ground.refused import refused
 
     definitions = [definition for document in documents for definition in document.definitions]
     domains: dict[str, Definition] = {}
@@ -129,6 +130,9 @@ def check_documents(documents: Iterable[Document], report: Report) -> None:
                 report.add(diagnostic)
         for diagnostic in check(*models) if models else ():
             report.add(diagnostic)
+        for model in models:
+            for diagnostic in refused(model):
+                report.add(replace(diagnostic, severity=Severity.NOTE))
 
 
 def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:

@@ -21,6 +21,7 @@ from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normalise
 from bbtc.ground.prune import prune
 from bbtc.ground.reach import Reach, reach
+from bbtc.ground.refused import refused
 from bbtc.ground.relevance import Relevance
 from bbtc.ground.start import Beginning, beginning
 from bbtc.ground.universe import Row
@@ -86,23 +87,11 @@ def _goal(model: md.Model, atoms: Atoms, report: Report, limits: Limits) -> Cond
 
 def _refuse(model: md.Model, report: Report) -> None:
     """Constructs that are read, but cannot be grounded yet."""
-    for schema in model.schemas.values():
-        if schema.observe is not None:
-            report.error(
-                "BBT0406",
-                f"`:observe` of action `{schema.name}` cannot be grounded yet",
-                schema.observe_span,
-                "write it as an effect: `(probabilistic 1/2 p 1/2 (not p))` under `(unknown p)`",
-            )
-    for sensor in model.sensors:
-        report.error("BBT0407", f"sensor `{sensor.name}` cannot be grounded yet", sensor.span)
-    if model.goal is None:
-        report.error(
-            "BBT0411",
-            f"problem `{model.problem}` has no goal to plan for" if model.problem else "no problem is given",
-            model.problem_span,
-            "bbtc plans for a goal; a metric alone is none",
-        )
+    for diagnostic in refused(model):
+        report.add(diagnostic)
+    if model.problem is None and model.goal is None:
+        hint = "bbtc plans for a goal; a metric alone is none"
+        report.error("BBT0411", "no problem is given", model.problem_span, hint)
 
 
 def _signatures(model: md.Model) -> tuple[gt.Signature, ...]:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
+from bbtc.ground.refused import has_oneof
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.model import domain as md
@@ -27,26 +28,12 @@ class Beginning:
 
 
 def beginning(model: md.Model, report: Report, limits: Limits) -> Beginning:
-    """The initial states of a model. Constructs that need hidden facts are refused with their own
-    codes: BBT0404 (``oneof``), BBT0405 (``or`` and other clauses), BBT0403 (too many states)."""
+    """The initial states of a model, but for what is :func:`refused <bbtc.ground.refused.refused>` anyway.
+    Too many of them are an error (BBT0403)."""
     facts = {(fact.predicate, fact.args): fact.value for fact in model.init.facts}
-    for clause in model.init.clauses:
-        what = "`invariant`" if clause.invariant else "`or` and other uncertain conditions"
-        report.error(
-            "BBT0405",
-            f"{what} in `:init` cannot be grounded yet",
-            clause.span,
-            "only facts, `(unknown …)` and `(probabilistic …)` can",
-        )
     states: list[tuple[Fraction, World]] = [(Fraction(1), {})]
     for choice in model.init.choices:
-        if _has_oneof(choice):
-            report.error(
-                "BBT0404",
-                "`oneof` in `:init` cannot be grounded yet",
-                choice.span,
-                "only facts, `(unknown …)` and `(probabilistic …)` can",
-            )
+        if has_oneof(choice):
             continue
         try:
             states = _product(
@@ -64,20 +51,6 @@ def beginning(model: md.Model, report: Report, limits: Limits) -> Beginning:
 
 class _TooMany(Exception):
     """A draw has more results than the limit allows."""
-
-
-def _has_oneof(effect: me.Effect) -> bool:
-    match effect:
-        case me.Choice(branches, oneof):
-            return (oneof and len(branches) > 1) or any(_has_oneof(branch.effect) for branch in branches)
-        case me.Together(parts):
-            return any(map(_has_oneof, parts))
-        case me.ForEach(_, inner) | me.When(_, inner):
-            return _has_oneof(inner)
-        case me.Set() | me.Add():
-            return False
-        case _:
-            assert_never(effect)
 
 
 def _draw(

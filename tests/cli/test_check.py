@@ -140,3 +140,26 @@ def test_two_domains_of_one_name_are_both_checked(folder: Path) -> None:
     assert findings(messages) == {("warning", "BBT0208", "d")}
     _, messages = bbtc("check", "domain.pddl", "other.pddl", "a.pddl", folder=folder)
     assert {UNUSED, ("warning", "BBT0301", "idle")} <= findings(messages)
+
+
+NOT_YET = """(define (domain look)
+  (:requirements :contingent)
+  (:predicates (unknown (seen)) (here) (there))
+  (:action look :precondition (unknown (seen)) :observe (seen))
+  (:action go :precondition (here) :effect (there)))
+(define (problem p) (:domain look)
+  (:init (unknown (seen)) (oneof (here) (there)) (or (here) (there)))
+  (:metric minimize (total-cost)))
+"""
+
+
+def test_what_compile_will_refuse_is_noted(tmp_path: Path) -> None:
+    """Each construct that is read and checked, but not compiled yet, has one note: the error of compile."""
+    (tmp_path / "look.pddl").write_text(NOT_YET)
+    status, checked = bbtc("check", "look.pddl", folder=tmp_path)
+    noted = set(re.findall(r"(\S+): note\[(BBT04\d\d)\]", checked))
+    assert {code for _, code in noted} == {"BBT0404", "BBT0405", "BBT0406", "BBT0411"}
+    assert status == 0
+    status, compiled = bbtc("compile", "look.pddl", folder=tmp_path)
+    assert set(re.findall(r"(\S+): error\[(BBT04\d\d)\]", compiled)) == noted
+    assert status == 1
