@@ -25,6 +25,10 @@ from bbtc.plan.space_packing import Flags
 from bbtc.plan.synthesis_rules import Learner, Literal, Rule, Test
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
 
+_MOST_LOOKS = 5_000
+"""How many rules are looked at, again and again, for tests to share: every run of rules that share one is
+tried, and what is left and right of it and in it, which takes exponential time where little is shared."""
+
 
 def synthesize(task: Task, offers: Offers, limits: Limits) -> Node:
     """A tree that takes one of the offers in every state a run visits, and otherwise fails.
@@ -54,7 +58,7 @@ def _tree(task: Task, offers: Offers, limits: Limits, *, fall_through: bool) -> 
     watching = learner.learn(unknown, nowhere)
     acting = learner.learn(false, unknown & ending)
     node = _goal_node(task, offers.values[learner.relevant()])
-    build = _Builder(task, offers.values)
+    build = _Builder(task, offers.values, limits)
     if watching:
         node = _control("skipper", [node, build.choice(build.rules(watching))])
     elif fall_through and (unknown & learner.relevant()).any():
@@ -85,21 +89,28 @@ def _size(nodes: Sequence[Node]) -> int:
     return sum(1 for node in nodes for _ in walk(node))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Builder:
     task: Task
     values: npt.NDArray[np.uint8]
+    limits: Limits
+    left: int = _MOST_LOOKS
+    """Rules that may still be looked at for tests to share."""
 
     def choice(self, children: list[Node]) -> Node:
         return _control("fallback", children)
 
     def rules(self, rules: Sequence[Rule]) -> list[Node]:
         """The rules as children of a Fallback, in order."""
+        self.limits.check_time("the search for a small tree")
+        self.left -= len(rules)
         best = self._flat(rules)
         for literal, start, end in self._shared(rules):
             inner = [replace(r, tests=tuple(t for t in r.tests if t != literal)) for r in rules[start:end]]
             if not self._settled([literal], rules[start].asked):
                 continue
+            if self.left < 0:
+                break
             asked = rules[start].asked[literal.holds(self.values[rules[start].asked])]
             inner[0] = replace(inner[0], asked=asked)
             branch = _control(

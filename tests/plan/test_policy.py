@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import random
 import time
 from fractions import Fraction
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -23,6 +25,9 @@ from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.policy_retry import longest_run
 from bbtc.plan.result import Plan
 from bbtc.plan.space import explore_space
+from bbtc.plan.synthesis_rules import Literal, Rule
+from bbtc.plan.synthesis_rules import Test as ValueTest
+from bbtc.plan.synthesis_tree import _Builder
 from bbtc.plan.value import reachability
 from bbtc.plan.value_cost import least_cost
 from bbtc.plan.value_horizon import horizon_values
@@ -224,3 +229,23 @@ def test_a_limit_leaves_the_best_that_was_found() -> None:
     done = plan(of, "1", Limits(nodes=3))
     assert done.stop is not None
     assert "nodes" in done.stop.message
+
+
+def test_many_rules_that_share_little_take_a_bounded_time_to_write_down() -> None:
+    """To try every run of rules that share a test, and again within and beside it, never ended."""
+    names, drawn = "a b c d e f g h i j k l m n o p", random.Random(1)
+    acts = [action(f"act{number}", Is(0, F), ("1", {0: T})) for number in range(80)]
+    of = task(names, {}, Is(0, T), *acts)
+    values = np.array([[drawn.choice((0, 2)) for _ in names.split()] for _ in range(400)], dtype=np.uint8)
+    rules, asked = [], np.arange(len(values))
+    for number in range(len(acts)):
+        chosen = sorted(drawn.sample(range(values.shape[1]), 8))
+        tests = tuple(Literal(variable, drawn.choice(list(ValueTest)[:2])) for variable in chosen)
+        rules.append(Rule(tests, number, asked))
+        asked = asked[~np.logical_and.reduce([test.holds(values[asked]) for test in tests])]
+    start = time.process_time()
+    nodes = _Builder(of, values, Limits()).rules(rules)
+    assert time.process_time() - start < 20
+    assert [each.action for node in nodes for each in walk(node) if isinstance(each, ActionNode)] == [
+        each.name for each in of.actions
+    ]
