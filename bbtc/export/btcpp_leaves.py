@@ -24,7 +24,8 @@ namespace ROBOT_TREE {
 
 /// A condition answers at once, with nothing where it is unknown. An action is called in every tick while it
 /// runs, and answers at once with RUNNING; with SUCCESS when the conditions show what it did; with FAILURE
-/// when the robot could not do it. It is cancelled when it is no longer wanted.
+/// when the robot could not do it. It is cancelled when it is no longer wanted; where another takes its
+/// place, in the same tick, but perhaps after the first call of the other.
 class Robot {
  public:
   virtual ~Robot() = default;
@@ -33,6 +34,27 @@ class Robot {
 ACCESS = """\
 /// The id of the tree to run.
 inline constexpr const char* kMainTree = MAIN_TREE;
+
+/// Tick a tree until it ends, with a pause between ticks. SIGINT (Ctrl-C) and SIGTERM end that, too: the
+/// action that runs is cancelled, and the status is RUNNING.
+inline BT::NodeStatus run(BT::Tree& tree, std::chrono::milliseconds pause) {
+  static volatile std::sig_atomic_t interrupted = 0;
+  interrupted = 0;
+  const auto interrupt = [](int) { interrupted = 1; };
+  const auto on_interrupt = std::signal(SIGINT, interrupt);
+  const auto on_terminate = std::signal(SIGTERM, interrupt);
+  BT::NodeStatus status = tree.tickOnce();
+  while (status == BT::NodeStatus::RUNNING && interrupted == 0) {
+    tree.sleep(pause);
+    status = interrupted == 0 ? tree.tickOnce() : status;
+  }
+  if (status == BT::NodeStatus::RUNNING) {
+    tree.haltTree();
+  }
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_terminate);
+  return status;
+}
 
 /// The value of a port.
 inline std::string argument(const BT::TreeNode& node, const std::string& port) {
@@ -50,6 +72,8 @@ _LEAVES = (
 // The leaves of the tree: a class for each condition and action. Made by bbtc; no need to edit it.
 #pragma once
 
+#include <chrono>
+#include <csignal>
 #include <optional>
 #include <string>
 
@@ -75,6 +99,7 @@ _STUB = """\
 // A robot to start from: copy this file to my_robot.hpp, and fill it in there.
 #pragma once
 
+#include <iostream>
 #include <optional>
 #include <string>
 
@@ -212,10 +237,17 @@ class LeafWriter:
         """``robot_stub.hpp``: a robot that knows and can do nothing yet."""
         lines = [self._open(_STUB)]
         for leaf in self.leaves():
-            action = leaf.symbol.kind == "action"
-            answer = "BT::NodeStatus::FAILURE" if action else "std::nullopt" if leaf.three_valued else "false"
-            declared = self.declaration(leaf, self.method(leaf), named=False)
-            lines += ["", f"  {declared} override {{", f"    return {answer};  // to be written", "  }"]
+            if leaf.symbol.kind == "action":
+                # Said aloud: a tree that tries without end would else be silent without end.
+                words = [cppcode.literal(f"to do: {self.method(leaf)}")]
+                words += (f"' ' << {parameter}" for parameter in cppcode.parameters(leaf.parameters))
+                body = [f"std::cerr << {' << '.join(words)} << '\\n';", "return BT::NodeStatus::FAILURE;"]
+                declared = self.declaration(leaf, self.method(leaf))
+            else:
+                answer = "std::nullopt" if leaf.three_valued else "false"
+                body = [f"return {answer};  // to be written"]
+                declared = self.declaration(leaf, self.method(leaf), named=False)
+            lines += ["", f"  {declared} override {{", *(f"    {line}" for line in body), "  }"]
         return "\n".join([*lines, "};", "", *self._close()])
 
     def _class(self, leaf: Leaf) -> str:

@@ -167,6 +167,8 @@ _HEAD = (
 // The leaves of the tree as clients in ROS 2. Made by bbtc: a start, to be adapted to your interfaces.
 #pragma once
 
+#include <chrono>
+#include <csignal>
 #include <memory>
 #include <string>
 #include <vector>
@@ -280,7 +282,8 @@ _MAIN = """\
 #include "leaves.hpp"
 
 int main(int argc, char** argv) {
-  rclcpp::init(argc, argv);
+  // With the signal handlers of rclcpp, no goal could be cancelled any more after Ctrl-C.
+  rclcpp::init(argc, argv, rclcpp::InitOptions(), rclcpp::SignalHandlerOptions::None);
   BT::RosNodeParams params;
   params.nh = std::make_shared<rclcpp::Node>("PACKAGE");
   BT::BehaviorTreeFactory factory;
@@ -288,7 +291,7 @@ int main(int argc, char** argv) {
   factory.registerBehaviorTreeFromFile(TREE_FILE);
   // A tree runs once: its latches stay latched. Make a new one for another run.
   auto tree = factory.createTree(ROBOT_TREE::kMainTree);
-  const BT::NodeStatus status = tree.tickWhileRunning(std::chrono::milliseconds(20));
+  const BT::NodeStatus status = ROBOT_TREE::run(tree, std::chrono::milliseconds(20));
   RCLCPP_INFO(params.nh->get_logger(), "the tree returned %s", BT::toStr(status).c_str());
   rclcpp::shutdown();
   return status == BT::NodeStatus::SUCCESS ? 0 : 1;

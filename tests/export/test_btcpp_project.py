@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 from dataclasses import replace
 from fractions import Fraction
@@ -86,8 +87,45 @@ def test_the_program_of_a_domain_compiles_and_succeeds_as_often_as_simulated(
     options = ("--ticks", "3", "--seed", "7", "--tree", "tree.xml")
     assert_succeeds_as_often(build / "simulate", success, *options)
     assert "The tree returned " in ran(build / "simulate", "--seed", "1")
-    # The stub knows nothing and can do nothing.
-    assert ran(build / "main") == "The tree returned FAILURE.\n"
+    # The stub knows nothing and can do nothing, and says so.
+    done = subprocess.run([build / "main"], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (0, "The tree returned FAILURE.\n")
+    todo = "to do: doDrive lobby" if name.startswith("charging") else "to do: doLightOn"
+    assert todo in done.stderr.splitlines()
+
+
+TIRELESS = """#include <iostream>
+#include "robot_stub.hpp"
+namespace robot_tree {
+class Tireless : public MyRobot {
+  BT::NodeStatus doLightOn() override {
+    std::cout << "light" << std::endl;
+    return BT::NodeStatus::RUNNING;
+  }
+  void cancelLightOn() override { std::cout << "cancel" << std::endl; }
+};
+}  // namespace robot_tree
+#define MyRobot Tireless
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_program_cancels_the_action_that_runs(number: signal.Signals, tireless: Path) -> None:
+    with subprocess.Popen([tireless], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "light\n"
+        program.send_signal(number)
+        *before, cancelled, last = program.communicate(timeout=30)[0].splitlines()
+    assert set(before) <= {"light"}
+    assert (cancelled, last, program.returncode) == ("cancel", "Interrupted.", 1)
+
+
+@pytest.fixture(scope="module")
+def tireless(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program ``main`` with a robot that never ends what it does."""
+    folder = tmp_path_factory.mktemp("tireless")
+    (folder / "my_robot.hpp").write_text(TIRELESS, encoding="utf-8")
+    return built(folder, soda_tree()) / "main"
 
 
 def hostile_tree() -> Tree:

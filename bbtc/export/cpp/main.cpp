@@ -19,7 +19,11 @@ int main() {
     factory.registerBehaviorTreeFromFile(TREE_FILE);
     // A tree runs once: its latches stay latched. Make a new one for another run.
     auto tree = factory.createTree(ROBOT_TREE::kMainTree);
-    const BT::NodeStatus status = tree.tickWhileRunning(std::chrono::milliseconds(100));
+    const BT::NodeStatus status = ROBOT_TREE::run(tree, std::chrono::milliseconds(100));
+    if (status == BT::NodeStatus::RUNNING) {
+      std::cout << "Interrupted.\n";
+      return EXIT_FAILURE;
+    }
     std::cout << "The tree returned " << BT::toStr(status) << ".\n";
     return EXIT_SUCCESS;
   } catch (const std::exception& error) {

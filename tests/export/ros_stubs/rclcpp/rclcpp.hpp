@@ -11,6 +11,8 @@ struct Node {
   explicit Node(const std::string&) {}
   Logger get_logger() const { return {}; }
 };
-inline void init(int, char**) {}
+struct InitOptions {};
+enum class SignalHandlerOptions { All, SigInt, SigTerm, None };
+inline void init(int, char**, const InitOptions&, SignalHandlerOptions) {}
 inline void shutdown() {}
 }  // namespace rclcpp
