@@ -17,7 +17,12 @@ from bbtc.verify.prism import KEYWORDS, counted, prism_text
 from bbtc.verify.process import process_of
 from bbtc.verify.program import REWARDS, Cell, Formula, Program
 
-FORM = Option("form", "auto", "one step for each action, or, smaller in deep trees, leaf", ("auto", "walk"))
+FORM = Option(
+    "form",
+    "auto",
+    "auto: a step for each action, in deep trees for each leaf; walk: for each leaf",
+    ("auto", "walk"),
+)
 
 
 @dataclass(frozen=True, slots=True)

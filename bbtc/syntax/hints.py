@@ -35,6 +35,7 @@ _TERM = re.compile(r"\s*\??[a-z0-9_][a-z0-9_.*+@#$%!~-]*", re.IGNORECASE)
 _ATOM_HEAD = re.compile(r"\(\s*([a-z0-9_][^\s()?]*)[^()]*\(", re.IGNORECASE)
 _NAME = re.compile(r"[a-z0-9_]", re.IGNORECASE)
 _PERCENTAGE = re.compile(r"(\d{1,9}(?:\.\d{1,9})?|\.\d{1,9})%", re.ASCII)
+_BARE_PARAMETERS = frozenset({("forall", ""), ("exists", ""), (":action", ":parameters")})
 _BARE_NOT = re.compile(r"\(\s*not\s+([^\s()]+(?:\s+[^\s()]+){1,8})\s*\)", re.IGNORECASE)
 
 # What may stand at a place, by the first terminal of the list that may.
@@ -270,6 +271,12 @@ def _joined(place: Place, found: str, forms: list[Form]) -> str | None:
     bare = _BARE_NOT.match(place.text, forms[-1].start) if forms else None
     if bare is not None and place.position < bare.end():
         return f"write `(not ({' '.join(bare[1].split())}))`"
+    if found.startswith(("//", "/*", "#|")):
+        return "comments start with `;` and end with the line"
+    if found.startswith("?") and forms and (forms[-1].word, forms[-1].field) in _BARE_PARAMETERS:
+        return f"parameters stand in parentheses: `({found} - type)`"
+    if found.startswith("(") and forms and forms[-1].word in {"unknown", "known"}:
+        return f"`{forms[-1].word}` is about one fact: `({forms[-1].word} (p …))`"
     if "VARIABLES" in place.accepted and _NAME.match(found):
         return f"parameters start with `?`: `?{found}`"
     if "HEAD" in place.accepted and _NAME.match(found):

@@ -293,7 +293,7 @@ def groups(text: str, offset: int, *, variables: bool) -> tuple[TypedGroup, ...]
 def _entry(word: str, at: int, source: SourceFile, variables: bool) -> Term:
     if variables is not word.startswith("?") or word == "?":
         what = "a parameter `?x`" if variables else "a name"
-        hint = f"parameters start with `?`: `?{word}`" if variables else None
+        hint = f"write `?{word}` for a parameter, `- {word}` for a type" if variables else None
         raise Misuse("BBT0101", f"expected {what}, found `{word}`", Span(source, at, at + len(word)), hint)
     node = _new(Variable if variables else Name)
     if variables:

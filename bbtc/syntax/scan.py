@@ -58,6 +58,14 @@ def too_deep(text: str, limit: int) -> int | None:
     return None
 
 
+_MEANT = {
+    **dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "write a plain `-`"),
+    **dict.fromkeys("\u00a0\u2002\u2003\u2009\u202f\ufeff", "write a plain space"),
+    ",": "spaces separate names and forms; commas do not",
+}
+"""What to write for characters that word processors and pages put in, and for commas."""
+
+
 def foreign_characters(text: str) -> tuple[list[Fault], str]:
     """The places where characters stand that the language does not use, and the text with an
     underscore for each of these."""
@@ -65,7 +73,7 @@ def foreign_characters(text: str) -> tuple[list[Fault], str]:
     for match in _FOREIGN.finditer(text):
         shown = repr(match.group()[:10])
         what = f"characters {shown}" if len(match.group()) > 1 else f"character {shown}"
-        hint = "names hold letters, digits and _ - . * + @ # $ % ! ~"
+        hint = _MEANT.get(match.group(), "names hold letters, digits and _ - . * + @ # $ % ! ~")
         faults.append(Fault("BBT0104", f"{what} cannot stand here", *match.span(), hint))
     return faults, _FOREIGN.sub(lambda match: "_" * len(match.group()), text) if faults else text
 

@@ -1,0 +1,5 @@
+(define (domain lamps)
+  (:types lamp – object)
+  (:predicates (lit ?l - lamp) (powered))
+  (:action light :parameters (?l - lamp, ?m - lamp)
+    :effect (lit ?l)))
