@@ -161,7 +161,15 @@ def dot_text(tree: Tree, items: tuple[Item, ...], *, with_legend: bool) -> str:
             "margin": "0.12,0.06",
             "style": "filled",
         },
-        edge_attr={"arrowsize": "0.6", "color": PEN, "fontname": FONT, "fontsize": "10"},
+        # From below a node to the top of its child: a line to the side would run over the neighbours.
+        edge_attr={
+            "arrowsize": "0.6",
+            "color": PEN,
+            "fontname": FONT,
+            "fontsize": "10",
+            "headport": "n",
+            "tailport": "s",
+        },
     )
     names = _node_names(items)
     for name, item in zip(names, items, strict=True):

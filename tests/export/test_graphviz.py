@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import shutil
@@ -22,7 +23,9 @@ from bbtc.diagnostics import BbtcError
 from bbtc.export.diagram import diagram, flow_text, wrap
 from bbtc.export.registry import load_exporter, parse_options
 from bbtc.export.svg_layout import Box, tidy
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree, walk
+from bbtc.ground.condition import Is
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 from tests.conftest import Golden
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
@@ -90,7 +93,7 @@ def read_dot(text: str) -> tuple[dict[str, Drawn], list[tuple[str, str]]]:
             "stroke-dasharray" in shape.attrib,
         )
     edges = [title(group).split("->") for group in groups if group.get("class") == "edge"]
-    return nodes, [(tail, head) for tail, head in edges]
+    return nodes, [(tail.removesuffix(":s"), head.removesuffix(":n")) for tail, head in edges]
 
 
 def title(group: ET.Element) -> str:
@@ -272,6 +275,30 @@ def test_graphviz_draws_where_it_is_installed() -> None:
     picture = export(soda_tree(), "png", {"layout": program, "dpi": "50"})
     assert isinstance(picture, bytes)
     assert picture.startswith(b"\x89PNG")
+
+
+def test_no_line_runs_over_a_node() -> None:
+    # A wide subtree left of a leaf: lines to it could pass through its neighbour.
+    numbers = itertools.count()
+
+    def wide(levels: int) -> Node:
+        leaf = ConditionNode(f"c{next(numbers)}", Is(0, Truth.TRUE), name="a leaf with a long name")
+        children = (wide(levels - 1), leaf, wide(levels - 1)) if levels else (leaf,)
+        return ControlNode(f"s{next(numbers)}", "sequence", children)
+
+    text = str(export(replace(soda_tree(), root=wide(4)), "dot"))
+    run = subprocess.run(
+        [graphviz_program(), "-Tplain"], input=text, capture_output=True, text=True, check=True, timeout=60
+    )
+    rows = [line.split(" ") for line in run.stdout.splitlines()]
+    boxes = {row[1]: [float(number) for number in row[2:6]] for row in rows if row[0] == "node"}
+    for _, tail, head, count, *numbers in (row for row in rows if row[0] == "edge"):
+        points = [float(number) for number in numbers[: 2 * int(count)]]
+        ends = (points[0], points[1]), (points[-2], points[-1])
+        for x, y in ((a + (b - a) * step / 20 for a, b in zip(*ends, strict=True)) for step in range(21)):
+            for name, (left, top, width, height) in boxes.items():
+                over = abs(x - left) < 0.45 * width and abs(y - top) < 0.45 * height
+                assert name in (tail, head) or not over
 
 
 @pytest.mark.parametrize("dpi", ["0", "-5", "100000"])
