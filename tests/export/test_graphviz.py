@@ -279,12 +279,12 @@ def test_graphviz_draws_where_it_is_installed() -> None:
 
 def test_no_line_runs_over_a_node() -> None:
     # A wide subtree left of a leaf: lines to it could pass through its neighbour.
-    numbers = itertools.count()
+    ids = itertools.count()
 
     def wide(levels: int) -> Node:
-        leaf = ConditionNode(f"c{next(numbers)}", Is(0, Truth.TRUE), name="a leaf with a long name")
+        leaf = ConditionNode(f"c{next(ids)}", Is(0, Truth.TRUE), name="a leaf with a long name")
         children = (wide(levels - 1), leaf, wide(levels - 1)) if levels else (leaf,)
-        return ControlNode(f"s{next(numbers)}", "sequence", children)
+        return ControlNode(f"s{next(ids)}", "sequence", children)
 
     text = str(export(replace(soda_tree(), root=wide(4)), "dot"))
     run = subprocess.run(
