@@ -5,8 +5,8 @@ where none does, the one with the greatest success probability.
 
 1. Search over refinements: it takes time with the size of the tree, not of the task.
 2. Write down an optimal policy. Where a tree that reaches the target is known already, only if the actions
-   and states of the task are few; else as the limits allow, since the policy tells whether the target can
-   be reached.
+   and states of the task are few, or the tree is large and they are not very many; else as the limits
+   allow, since the policy tells whether the target can be reached.
 3. Refine greedily, as published, in as many nodes as would make a smaller tree than those found; of
    a task with many actions, again, only where the target was not reached.
 
@@ -34,6 +34,12 @@ MANY_ACTIONS = 500
 
 _STATES_AND_ACTIONS = 200_000
 """For a second opinion, states times actions of the task are explored up to this number."""
+
+LARGE_TREE = 100
+"""Nodes; a tree of more is hard to read, and a second opinion on it worth more work."""
+
+_WORK_FOR_LARGE = 3_000_000
+"""States times actions explored for a second opinion on a large tree: some seconds."""
 
 _REFINE_STATES = 20_000
 """States of one simulation while refining for a second opinion."""
@@ -91,7 +97,8 @@ def _policy(task: Task, target: Fraction, limits: Limits, options: Options, know
         return plan_policy(task, target, limits, _silent, options)
     if size(known.tree.root) == 1 or len(task.actions) > MANY_ACTIONS:
         return None
-    few = max(1, min(limits.states, _STATES_AND_ACTIONS // max(1, len(task.actions))))
+    work = _WORK_FOR_LARGE if size(known.tree.root) > LARGE_TREE else _STATES_AND_ACTIONS
+    few = max(1, min(limits.states, work // max(1, len(task.actions))))
     try:
         found = plan_policy(task, target, replace(limits, states=few), _silent, options, whole=True)
     except LimitReached:  # more states than that

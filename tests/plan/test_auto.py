@@ -81,3 +81,16 @@ def test_by_default_the_templates_of_a_domain_are_followed_if_that_reaches_the_t
     sure = plan(soda, DEFAULT, "1")
     assert sure.tree.success_probability == plan(soda, "auto", "1").tree.success_probability
     assert sure.tree.success_probability > plan(soda, "refine", "1").tree.success_probability
+
+
+def test_a_large_tree_is_worth_a_longer_second_opinion(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the task is too large for a quick one, the search's tree stands, unless it is large itself."""
+    (of,) = (task_of(p) for p in PROBLEMS if str(p) == "warehouse/blocked-aisle")
+    found, small = size(plan(of, "search")), size(plan(of, "policy"))
+    assert small < found
+    monkeypatch.setattr("bbtc.plan.auto._STATES_AND_ACTIONS", 1)
+    monkeypatch.setattr("bbtc.plan.auto._refine", lambda *_: None)
+    monkeypatch.setattr("bbtc.plan.auto.LARGE_TREE", found)
+    assert size(plan(of, "auto")) == found
+    monkeypatch.setattr("bbtc.plan.auto.LARGE_TREE", found - 1)
+    assert size(plan(of, "auto")) == small
