@@ -36,7 +36,9 @@ Env = list[int]
 """Numbers of objects: arguments first, then constants and the current values of quantifiers."""
 Lowered = Callable[[Env], Condition]
 
+_LOOK = 4096  # bindings between two looks at the clock
 _MOST_UNFOLDINGS = 100_000
+_LARGEST_UNFOLDING = 100_000  # literals, those of shared parts counted each time
 _DEEPEST_UNFOLDING = 80
 
 
@@ -103,7 +105,7 @@ class Lowering:
         self.atoms = atoms
         self.universe = atoms.universe
         self._limits = limits
-        self._bindings = 0
+        self._bindings = self._unlooked = 0
         self._derived = _Derived(self)
 
     def condition(self, formula: mf.Formula, frame: Frame, *, strict: bool = False) -> Lowered:
@@ -127,9 +129,17 @@ class Lowering:
         return Shared(used, len(parameters), lambda rows: [condition(frame.env(row)) for row in rows])
 
     def spend(self, count: int) -> None:
-        """Count objects that a quantifier is tried with. Raises at the limit."""
+        """Count objects that a quantifier is tried with. Raises at the limits."""
         self._bindings += count
         self._limits.check_bindings(self._bindings)
+        self._unlooked += count
+        if self._unlooked > _LOOK:
+            self.look()
+
+    def look(self) -> None:
+        """Raise if the time is over or the memory is used up."""
+        self._unlooked = 0
+        self._limits.check_time("grounding")
 
     def ground(self, formula: mf.Formula, *, strict: bool = False) -> Condition:
         """A condition without free parameters."""
@@ -383,6 +393,7 @@ class _Derived:
         self._reach = lowering.atoms.reach
         self._rules: dict[str, list[tuple[md.Rule, Frame, list[int], Lowered]]] = {}
         self._known: dict[tuple[str, Row], Condition] = {}
+        self._sizes: dict[int, tuple[int, Condition]] = {}  # by identity; what it is of stays alive
         self._depth: dict[tuple[str, Row], int] = {}
         self._lowest = _DEEPEST_UNFOLDING
         self._count = 0
@@ -410,14 +421,16 @@ class _Derived:
         self._count += 1
         depth = len(self._depth)
         if self._count > _MOST_UNFOLDINGS or depth >= _DEEPEST_UNFOLDING:
-            raise BbtcError.single(
-                "BBT0408",
-                f"the derived predicate `{predicate}` is too deeply recursive to be unfolded",
-                next(rule.span for rule in self._reach.usage.model.rules if rule.predicate == predicate),
-            )
+            raise self._refused(predicate, "is too deeply recursive")
+        self._lowering.look()
         above, self._lowest = self._lowest, _DEEPEST_UNFOLDING
         self._depth[key] = depth
-        result = _absorbed(disjunction(self._instances(predicate, row)))
+        try:
+            result = _absorbed(disjunction(self._instances(predicate, row)))
+        except RecursionError:  # each level may have many of Python's
+            raise self._refused(predicate, "is too deeply recursive") from None
+        if self._size(result) > _LARGEST_UNFOLDING:
+            raise self._refused(predicate, f"stands for more than {_LARGEST_UNFOLDING:,} literals, too many")
         del self._depth[key]
         if self._lowest >= depth:
             self._known[key] = result
@@ -425,6 +438,22 @@ class _Derived:
         else:
             self._lowest = min(above, self._lowest)
         return result
+
+    def _refused(self, predicate: str, why: str) -> BbtcError:
+        rules = self._reach.usage.model.rules
+        place = next(rule.span for rule in rules if rule.predicate == predicate)
+        return BbtcError.single("BBT0408", f"the derived predicate `{predicate}` {why} to be unfolded", place)
+
+    def _size(self, condition: Condition) -> int:
+        """How many literals a condition has. Parts that stand in several places are looked at once."""
+        known = self._sizes.get(id(condition))
+        if known is not None:
+            return known[0]
+        if not isinstance(condition, And | Or):
+            return 1
+        size = sum(map(self._size, condition.parts))
+        self._sizes[id(condition)] = size, condition
+        return size
 
     def _instances(self, predicate: str, row: Row) -> Iterator[Condition]:
         if predicate not in self._rules:

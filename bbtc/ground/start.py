@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 
 from typing_extensions import assert_never
 
@@ -36,9 +38,7 @@ def beginning(model: md.Model, report: Report, limits: Limits) -> Beginning:
         if has_oneof(choice):
             continue
         try:
-            states = _product(
-                [states, _draw(model, choice, {}, limits.initial_states)], limits.initial_states
-            )
+            states = _product([states, _draw(model, choice, {}, limits)], limits)
         except _TooMany:
             report.error(
                 "BBT0403",
@@ -54,7 +54,7 @@ class _TooMany(Exception):
 
 
 def _draw(
-    model: md.Model, effect: me.Effect, binding: dict[str, str], limit: int
+    model: md.Model, effect: me.Effect, binding: dict[str, str], limits: Limits
 ) -> list[tuple[Fraction, World]]:
     match effect:
         case me.Set(predicate, args, value):
@@ -63,35 +63,42 @@ def _draw(
         case me.Add():
             return [(Fraction(1), {})]
         case me.When(_, inner):
-            return _draw(model, inner, binding, limit)
+            return _draw(model, inner, binding, limits)
         case me.Choice(branches):
             return _merged(
                 [
                     (branch.probability * p, world)
                     for branch in branches
                     if branch.probability > 0
-                    for p, world in _draw(model, branch.effect, binding, limit)
+                    for p, world in _draw(model, branch.effect, binding, limits)
                 ]
             )
         case me.Together(parts):
-            return _product([_draw(model, part, binding, limit) for part in parts], limit)
+            return _product((_draw(model, part, binding, limits) for part in parts), limits)
         case me.ForEach(parameters, inner):
-            bindings = [binding]
-            for parameter in parameters:
-                bindings = [
-                    {**each, parameter.name: name}
-                    for each in bindings
-                    for name, thing in model.objects.items()
-                    if model.types.contains(parameter.types, thing)
-                ]
-            return _product([_draw(model, inner, each, limit) for each in bindings], limit)
+            members = [
+                [name for name, thing in model.objects.items() if model.types.contains(p.types, thing)]
+                for p in parameters
+            ]
+            names = [parameter.name for parameter in parameters]
+            # One after the other: mostly there are too many results long before there are too many bindings.
+            return _product(
+                (
+                    _draw(model, inner, {**binding, **dict(zip(names, objects, strict=True))}, limits)
+                    for objects in product(*members)
+                ),
+                limits,
+            )
         case _:
             assert_never(effect)
 
 
-def _product(draws: list[list[tuple[Fraction, World]]], limit: int) -> list[tuple[Fraction, World]]:
+def _product(draws: Iterable[list[tuple[Fraction, World]]], limits: Limits) -> list[tuple[Fraction, World]]:
+    limit = limits.initial_states
     result: list[tuple[Fraction, World]] = [(Fraction(1), {})]
-    for draw in draws:
+    for count, draw in enumerate(draws, 1):
+        limits.check_bindings(count)
+        limits.check_time("grounding")
         if len(result) * len(draw) > 4 * limit:
             raise _TooMany
         result = _merged([(p * q, _both(world, more)) for p, world in result for q, more in draw])

@@ -47,6 +47,7 @@ from bbtc.ground.task import (
     effects_of,
 )
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node
 
 Doing: TypeAlias = GroundAction | GroundTemplate
@@ -138,19 +139,25 @@ def new_attempt(subgoal: Subgoal, doing: Doing | None, conditions: list[Conditio
 
 
 def actions_in(task: Task, body: Body) -> Iterator[GroundAction]:
-    """The actions of a template body, called templates included, repeats included."""
-    match body:
-        case BodyControl():
-            for child in body.children:
-                yield from actions_in(task, child)
-        case BodyCondition():
-            return
-        case BodyAction():
-            yield task.action_by_name[body.action]
-        case BodyTemplate():
-            yield from actions_in(task, task.template_by_name[body.template].body)
-        case _:
-            assert_never(body)
+    """The actions of a template body, from left to right; those of a called template where it is called
+    first. (A few templates that call one another can stand for very many nodes.)"""
+    stack: list[Body] = [body]
+    called: set[str] = set()
+    while stack:
+        part = stack.pop()
+        match part:
+            case BodyControl():
+                stack.extend(reversed(part.children))
+            case BodyCondition():
+                pass
+            case BodyAction():
+                yield task.action_by_name[part.action]
+            case BodyTemplate():
+                if part.template not in called:
+                    called.add(part.template)
+                    stack.append(task.template_by_name[part.template].body)
+            case _:
+                assert_never(part)
 
 
 def changed_by(task: Task, body: Body) -> frozenset[int]:
@@ -166,13 +173,17 @@ def changes(action: GroundAction) -> frozenset[int]:
 class _Freezer:
     """Builds the nodes of a draft and remembers what each belongs to."""
 
-    def __init__(self, draft: Draft) -> None:
+    def __init__(self, draft: Draft, limits: Limits) -> None:
         self.draft = draft
+        self.limits = limits
+        self.nodes = 0
         self.task = draft.task
         self.owners: dict[str, Owner] = {}
         self.actions: dict[str, Attempt] = {}
 
     def id(self, ids: dict[str, str], role: str) -> str:
+        self.nodes += 1
+        self.limits.check_nodes(self.nodes)
         if role not in ids:
             ids[role] = f"n{self.draft.next_id}"
             self.draft.next_id += 1
@@ -295,9 +306,9 @@ class Frozen:
     attempts: dict[str, Attempt]
 
 
-def freeze(draft: Draft) -> Frozen:
-    """The draft as a tree."""
-    freezer = _Freezer(draft)
+def freeze(draft: Draft, limits: Limits) -> Frozen:
+    """The draft as a tree. Raises :class:`bbtc.diagnostics.LimitReached` if it has too many nodes."""
+    freezer = _Freezer(draft, limits)
     goals = [freezer.subgoal(goal) for goal in draft.goals]
     root = freezer.control(draft.ids, "sequence", "root", goals)
     return Frozen(root, freezer.owners, freezer.actions)

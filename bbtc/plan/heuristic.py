@@ -18,7 +18,7 @@ from bbtc.ground.condition import TRUE, And, Condition
 from bbtc.ground.task import Effect, Factor, Task
 from bbtc.kleene import Truth
 from bbtc.plan.space_actions import Index
-from bbtc.plan.space_packing import Cube, Packing, Words, bit_test, cubes
+from bbtc.plan.space_packing import Cube, Packing, Words, bit_test, cubes, set_bits
 from bbtc.rounding import rounded
 
 Costs = npt.NDArray[np.float32]
@@ -60,7 +60,8 @@ class Heuristic:
         self._index(operators or {((self._always,), (self._always,)): 0.0})
 
     def _needs(self, cube: Cube) -> Iterator[int]:
-        for variable, unknown in enumerate(self.packing.unknown):
+        for variable in sorted({self.packing.owner(bit) for bit in set_bits(cube.mask)}):
+            unknown = self.packing.unknown[variable]
             whether = 0 if unknown is None else cube.mask >> unknown & 1
             if cube.mask >> variable & 1:
                 yield 4 * variable + (2 if cube.value >> variable & 1 else 0)

@@ -66,8 +66,7 @@ class _Refiner:
 
     def simulate(self) -> Simulated:
         """Step 1."""
-        frozen = freeze(self.draft)
-        self.limits.check_nodes(sum(1 for _ in walk(frozen.root)))
+        frozen = freeze(self.draft, self.limits)
         self.limits.check_time("planning")
         chain = explore(self.task, frozen.root, self.limits, self.transitions)
         visits = Absorption(chain).visits()

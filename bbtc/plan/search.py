@@ -113,7 +113,7 @@ class _Search:
 
     def run(self) -> None:
         """Search until the target is reached, nothing is left, or enough was tried."""
-        self.moves = Moves(self.task)
+        self.moves = Moves(self.task, self.limits)
         self.push(_Open(None, None, 0, ()), Fraction(1))
         while self.heap and self.trees < MOST_TREES and self.states < MOST_STATES:
             shortfall, discrepancy, depth, _, entry = heapq.heappop(self.heap)
@@ -146,12 +146,15 @@ class _Search:
     def simulate(self, entry: _Open) -> _Seen | None:
         """Make the refinement and simulate; None for a tree seen before, and for one too large."""
         draft = self.refined(entry)
-        frozen = freeze(draft)
+        self.limits.check_time("planning")
         form = _form(draft)
-        if form in self.known or size(frozen.root) > self.limits.nodes:
+        if form in self.known:
+            return None
+        try:
+            frozen = freeze(draft, self.limits)
+        except LimitReached:
             return None
         self.known.add(form)
-        self.limits.check_time("planning")
         narrow = replace(self.limits, states=min(self.limits.states, _TREE_STATES))
         self.trees += 1
         try:
@@ -319,9 +322,8 @@ def plan_search(
     Raises :class:`bbtc.diagnostics.LimitReached` only if the limits do not even allow the simulation of
     the initial belief.
     """
-    start = freeze(Draft.start(task)).root
+    start = freeze(Draft.start(task), limits).root
     initial = simulate(task, start, limits)
-    limits.check_nodes(size(start))
     search = _Search(task, target, limits)
     status: PlanStatus = "stuck"
     stop: Diagnostic | None = None

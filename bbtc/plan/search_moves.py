@@ -17,6 +17,7 @@ from bbtc.belief.state import Values
 from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, negation, variables
 from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.plan.choose import circular
 from bbtc.plan.draft import Attempt, Draft, Subgoal
 from bbtc.plan.relaxed import Costs, Facts, RelaxedReachability, helpful
@@ -62,8 +63,9 @@ class Insertion:
 class Moves:
     """Finds insertions in the states of one task."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, limits: Limits) -> None:
         self.task = task
+        self.limits = limits
         self.relaxed = RelaxedReachability(task)
 
     def insertions(self, subgoals: Iterable[Subgoal], draft: Draft, values: Values) -> list[Insertion]:
@@ -141,9 +143,13 @@ class Moves:
         facts = self.relaxed.facts(values)
         plans = {c: _Plan(self, c, facts, values) for c in waiting}
         uncertain = {c: any(self.task.variables[v].three_valued for v in variables(c)) for c in waiting}
-        trouble = {(a, b): plans[a].trouble_before(plans[b]) for a in waiting for b in waiting if a is not b}
+        trouble: dict[tuple[Condition, Condition], int] = {}
+        for a in waiting:
+            self.limits.check_time("planning")
+            trouble.update({(a, b): plans[a].trouble_before(plans[b]) for b in waiting if a is not b})
         found: list[Condition] = []
         while waiting:
+            self.limits.check_time("planning")
             # How many of the others would rather come before; in doubt, as declared.
             before = [sum(trouble[o, c] < trouble[c, o] for o in waiting if o is not c) for c in waiting]
             first = min(

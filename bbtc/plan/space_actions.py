@@ -15,7 +15,18 @@ from bbtc.ground.condition import Condition
 from bbtc.ground.task import Effect, Factor, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan.space_packing import WORD, BitTest, Cube, Flags, Packing, Words, bit_test, cubes, holds
+from bbtc.plan.space_packing import (
+    WORD,
+    BitTest,
+    Cube,
+    Flags,
+    Packing,
+    Words,
+    bit_test,
+    cubes,
+    holds,
+    set_bits,
+)
 
 Index: TypeAlias = npt.NDArray[np.int64]
 
@@ -118,8 +129,8 @@ class ActionTables:
         firsts: list[int] = []
         for _, cube in rows:
             firsts.append(len(literals))
-            bits = [bit for bit in range(cube.mask.bit_length()) if cube.mask >> bit & 1]
-            literals.extend([bit + width * (cube.value >> bit & 1) for bit in bits] or [2 * width])
+            numbers = [bit + width * (cube.value >> bit & 1) for bit in set_bits(cube.mask)]
+            literals.extend(numbers or [2 * width])
         self._literal = np.array(literals, dtype=np.int64)
         self._literal_first = np.array(firsts, dtype=np.int64)
 

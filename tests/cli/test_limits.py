@@ -204,3 +204,115 @@ def test_numbers_beyond_all_floats_are_planned_with_and_shown(tmp_path: Path) ->
         assert _run(command[0], str(tree), *command[1:]).returncode == 0
     for form in ("btcpp", "py_trees", "prism", "jani", "svg"):
         assert _run("export", str(tree), "--to", form, "-o", str(tmp_path / form)).returncode == 0
+
+
+_OBJECTS = " ".join(f"o{n}" for n in range(300))
+_QUANTIFIED = "(forall (?a ?b ?c ?d) {})"
+_WIDE = {
+    "a quantified effect": (
+        "(p ?x) (q ?x)",
+        "(:action a :effect " + _QUANTIFIED.format("(when (and (p ?b) (p ?c) (p ?d)) (q ?a))") + ")"
+        "(:action b :parameters (?x) :effect (not (p ?x)))",
+        " ".join(f"(p o{n})" for n in range(300)),
+        "(q o1)",
+    ),
+    "a body": (
+        "(p ?x) (g)",
+        (
+            "(:action a :parameters (?x) :effect (p ?x))"
+            "(:template t :effect (g) :body (sequence (foreach (?a ?b ?c ?d) (a ?a))))"
+        ),
+        "",
+        "(p o1)",
+    ),
+    "a draw at the start": (
+        "(p ?x) (g)",
+        "(:action a :effect (g))",
+        _QUANTIFIED.format("(probabilistic 1/2 (p o1))"),
+        "(g)",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", _WIDE)
+def test_quantifiers_over_billions_of_bindings_end_at_the_time_limit(tmp_path: Path, what: str) -> None:
+    predicates, actions, init, goal = _WIDE[what]
+    file = tmp_path / "wide.pddl"
+    file.write_text(
+        f"(define (domain d) (:predicates {predicates}) {actions})"
+        f"(define (problem p) (:domain d) (:objects {_OBJECTS}) (:init {init}) (:goal {goal}))"
+    )
+    done = _run("compile", str(file), "--time-limit", "1", "-o", str(tmp_path / "task.json"))
+    assert done.returncode == 3
+    assert "raise it with --time-limit" in done.stderr
+
+
+def _doubling(levels: int) -> tuple[str, str]:
+    """Derived predicates, and templates, each of which stands for twice what the one before does."""
+    rules = "(:derived (d0) (e0))" + "".join(
+        f"(:derived (d{n}) (or (and (d{n - 1}) (e{n % 3})) (and (d{n - 1}) (not (e{n % 2})))))"
+        for n in range(1, levels)
+    )
+    bodies = "(:template t0 :effect (g) :body (sequence (a) (a)))" + "".join(
+        f"(:template t{n} :effect (g) :body (sequence (t{n - 1}) (t{n - 1})))" for n in range(1, levels)
+    )
+    return rules, bodies
+
+
+def test_derived_predicates_of_exponential_size_are_refused(tmp_path: Path) -> None:
+    rules, _ = _doubling(60)
+    names = " ".join(f"(d{n})" for n in range(60))
+    file = tmp_path / "derived.pddl"
+    file.write_text(
+        f"(define (domain d) (:predicates (e0) (e1) (e2) (g) {names}) {rules}"
+        "(:action x :effect (e0)) (:action y :effect (e1)) (:action z :effect (not (e2)))"
+        "(:action b :precondition (d59) :effect (g)))"
+        "(define (problem p) (:domain d) (:init (e2)) (:goal (g)))"
+    )
+    done = _run("compile", str(file), "-o", str(tmp_path / "task.json"))
+    assert done.returncode == 1
+    assert "BBT0408" in done.stderr
+    assert "derived.pddl:1:" in done.stderr
+
+
+def test_a_derived_predicate_with_very_many_ways_to_prove_itself_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "derived.pddl"
+    objects = " ".join(f"o{n}" for n in range(40))
+    file.write_text(
+        "(define (domain d) (:predicates (e ?x ?y) (r ?x ?y))"
+        "(:derived (r ?x ?y) (or (e ?x ?y) (exists (?z) (and (r ?x ?z) (r ?z ?y)))))"
+        "(:action a :parameters (?x ?y) :effect (e ?x ?y)))"
+        f"(define (problem p) (:domain d) (:objects {objects}) (:init) (:goal (r o1 o2)))"
+    )
+    done = _run("compile", str(file), "-o", str(tmp_path / "task.json"))
+    assert done.returncode == 1
+    assert "BBT0408" in done.stderr
+
+
+@pytest.mark.parametrize("strategy", ["auto", "refine"])
+def test_templates_that_stand_for_very_many_nodes_end_at_the_limit_on_nodes(
+    tmp_path: Path, strategy: str
+) -> None:
+    _, bodies = _doubling(60)
+    file = tmp_path / "templates.pddl"
+    file.write_text(
+        f"(define (domain d) (:predicates (p) (g)) (:action a :precondition (p) :effect (p)) {bodies}"
+        "(:action b :precondition (p) :effect (probabilistic 1/2 (g) 1/2 (not (p)))))"
+        "(define (problem p) (:domain d) (:init (p)) (:goal (g)))"
+    )
+    done = _run("plan", str(file), "--strategy", strategy, "-q", "-o", str(tmp_path / "tree.json"))
+    assert done.returncode in {1, 3}
+    assert (tmp_path / "tree.json").exists()
+
+
+@pytest.mark.parametrize("how", [["--bounds"], ["--strategy", "policy"], ["--strategy", "search"]])
+def test_a_goal_of_very_many_conditions_ends_at_the_time_limit(tmp_path: Path, how: list[str]) -> None:
+    objects = [f"o{n}" for n in range(6000)]
+    file = tmp_path / "goal.pddl"
+    file.write_text(
+        "(define (domain d) (:predicates (p ?x)) (:action a :parameters (?x) :effect (p ?x)))"
+        f"(define (problem p) (:domain d) (:objects {' '.join(objects)}) (:init)"
+        f"(:goal (and {' '.join(f'(p {name})' for name in objects)})))"
+    )
+    done = _run("plan", str(file), *how, "--time-limit", "2", "-q", "-o", str(tmp_path / "out"))
+    assert done.returncode in {0, 3}
