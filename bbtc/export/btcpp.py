@@ -25,7 +25,15 @@ from bbtc.export.shape import fit, written
 from bbtc.ground.condition import TRUE, And, Condition, Or, variables
 from bbtc.ground.task import GroundAction, Task, ground_name, split_name
 from bbtc.tree.deep import Deep, unwind
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlNode,
+    Node,
+    Tree,
+    tries_without_end,
+    walk,
+)
 
 ENGINE = "BehaviorTree.CPP"
 _DEEPEST_XML = 120  # levels of a BehaviorTree before a subtree gets one of its own; the engine takes 256
@@ -124,7 +132,10 @@ class _Writer:
 
     def _headline(self) -> str:
         task, claim = self.task, self.tree.success_probability
-        return shown(f"{task.domain}, {task.problem}: succeeds with probability {claim}. Made by bbtc.")
+        unbounded = " Nothing bounds how often it tries." if tries_without_end(self.tree.root) else ""
+        return shown(
+            f"{task.domain}, {task.problem}: succeeds with probability {claim}.{unbounded} Made by bbtc."
+        )
 
     # --- nodes -------------------------------------------------------------------------------
 

@@ -36,6 +36,7 @@ from bbtc.tree.nodes import (
     Tree,
     actions_of,
     retries_of,
+    tries_without_end,
 )
 
 _DEEPEST_EXPRESSION = 10  # levels of nodes in one function; a deeper subtree gets a function
@@ -113,6 +114,7 @@ class _Writer:
             f'"""Behavior tree for the problem {problem} of the domain {domain}. Made by bbtc.',
             "",
             f"In the model of that domain it succeeds with probability {self.claim}.",
+            *([_UNBOUNDED] if tries_without_end(self.root) else []),
             *_USAGE.splitlines(),
             _REQUIRED[self.embedded],
             '"""',
@@ -196,6 +198,8 @@ Implement the class Robot, and run
 
 As a program, this module runs the tree in a simulated world (--help tells how).
 """
+
+_UNBOUNDED = "Nothing bounds how often it tries: with a robot that always fails, it never ends."
 
 _REQUIRED = {
     True: "It needs py_trees 2.2 or later.",

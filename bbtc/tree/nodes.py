@@ -132,3 +132,9 @@ def retries_of(node: Node) -> Iterator[tuple[ControlNode, int]]:
 def actions_of(node: Node) -> Iterator[ActionNode]:
     """The action nodes, from left to right."""
     return (n for n in walk(node) if isinstance(n, ActionNode))
+
+
+def tries_without_end(root: Node) -> bool:
+    """Whether nothing bounds how often some action starts: it is neither latched nor below a retry node."""
+    bounded = {action.id for retry, _ in retries_of(root) for action in actions_of(retry)}
+    return any(not action.latched and action.id not in bounded for action in actions_of(root))

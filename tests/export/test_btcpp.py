@@ -218,6 +218,21 @@ def test_a_namespace_never_makes_an_id_of_the_engine() -> None:
         check_form(export(tree, namespace=namespace))
 
 
+def test_a_tree_that_tries_without_end_says_so_in_either_engine() -> None:
+    go = GroundAction("go", (), TRUE, ())
+    often, once = ActionNode("a", "go()", latched=False), ActionNode("b", "go()")
+    bounded = ControlNode("r", "retry", (often,), attempts=2)
+    py_trees = load_exporter("py_trees")
+    for root, expected in (
+        (ControlNode("f", "fallback", (once, often)), True),
+        (ControlNode("f", "fallback", (bounded, replace(often, id="c"))), True),
+        (ControlNode("f", "fallback", (bounded, once)), False),
+    ):
+        tree = tree_of(root, actions=(go,))
+        texts = export(tree), str(py_trees.export(tree, parse_options(py_trees, {}), None))
+        assert ["Nothing bounds how often it tries" in text for text in texts] == [expected] * 2
+
+
 def test_the_model_can_be_left_out() -> None:
     assert "TreeNodesModel" not in export(soda_tree(), model="no")
 

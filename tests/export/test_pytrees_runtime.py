@@ -87,6 +87,16 @@ def test_a_tree_that_is_shut_down_cancels_what_runs_in_it() -> None:
     assert robot.heard == [{}, "go", "go", "cancel go"]
 
 
+def test_a_timeout_ends_a_tree_that_would_try_without_end() -> None:
+    robot = Recorder()
+    latch = Latch("go", lambda: Status.FAILURE, robot.cancel, keep=False)
+    tree = py_trees.decorators.Timeout("at most 20 ms", StopWhenBlocked(robot, latch), 0.02)
+    assert run(tree, period=0.001) is Status.FAILURE
+    tree = py_trees.decorators.Timeout("at most 20 ms", robot.root(), 0.02)
+    assert run(tree, period=0.001) is Status.FAILURE
+    assert robot.heard[-1] == "cancel go"
+
+
 def test_a_snapshot_tells_what_is_unknown_and_how_many_attempts_were_made() -> None:
     beliefs: list[bool | None] = [None]
     robot = Recorder()

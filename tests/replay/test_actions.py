@@ -171,6 +171,12 @@ def test_an_action_that_is_not_latched_starts_again_after_every_end(engine: Engi
     assert shown(ticks) == expected
 
 
+def test_an_action_that_fails_at_once_is_tried_once_a_tick_also_without_end(engine: Engine) -> None:
+    root = control("fallback", check(P), ActionNode("a", "go()", latched=False))
+    ticks = engine(tree_of(root)).trace(script(N, N, N, Y, runs=((1, False),) * 9))
+    assert shown(ticks) == ["+go() running", "+go() running", "+go() running", " success"]
+
+
 def test_a_cancelled_attempt_counts_below_a_retry_node(engine: Engine) -> None:
     go = ActionNode("a", "go()", latched=False)
     tries = control("fallback", control("sequence", check(P), go), check(Q))

@@ -1,6 +1,7 @@
 """Behavior tree for the problem to-the-lab of the domain doors. Made by bbtc.
 
 In the model of that domain it succeeds with probability 547/675.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
