@@ -109,6 +109,11 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
             status = function(session, **arguments)
         except BbtcError as error:
             _fail(session, error)
+        except RecursionError:
+            if limits.depth <= Limits().depth:
+                raise  # a bug: what is nested no deeper than that never takes so many frames
+            message = "an input is nested deeper than it can be worked with"
+            _fail(session, BbtcError.single("BBT0005", message, hint="nest it less, whatever --max-depth is"))
         finally:
             session.clear()
         session.show([*session.report])

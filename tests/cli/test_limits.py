@@ -316,3 +316,17 @@ def test_a_goal_of_very_many_conditions_ends_at_the_time_limit(tmp_path: Path, h
     )
     done = _run("plan", str(file), *how, "--time-limit", "2", "-q", "-o", str(tmp_path / "out"))
     assert done.returncode in {0, 3}
+
+
+@pytest.mark.parametrize("command", [["check"], ["compile"], ["plan", "-q"], ["export", "--to", "prism"]])
+def test_what_a_raised_limit_on_depth_lets_in_ends_with_a_message(tmp_path: Path, command: list[str]) -> None:
+    file = tmp_path / "nested.pddl"
+    nested = "(not " * 880 + "(p)" + ")" * 880
+    file.write_text(
+        f"(define (domain d) (:predicates (p) (g)) (:action a :precondition {nested} :effect (g))"
+        "(:action b :effect (p)))(define (problem q) (:domain d) (:init) (:goal (g)))"
+    )
+    done = _run(command[0], str(file), *command[1:], "--max-depth", "900")
+    assert done.returncode == 1
+    assert "BBT0005" in done.stderr
+    assert done.stdout == ""
