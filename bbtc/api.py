@@ -109,6 +109,7 @@ def plan(
     strategy: str | None = None,
     max_actions: int | None = None,
     retries: Retries = "least",
+    guarded: bool = False,
     limits: Limits | None = None,
     report: Report | None = None,
     progress: Callable[[Refinement], None] | None = None,
@@ -116,7 +117,8 @@ def plan(
     """Plan a tree that reaches the goal with the target probability (default: the problem's own).
 
     ``strategy`` is ``advised`` (the default), ``auto``, ``search``, ``policy`` or ``refine``;
-    ``max_actions`` bounds the actions of every run; ``progress`` is told each refinement as it is made.
+    ``max_actions`` bounds the actions of every run; ``guarded`` trees check preconditions and the goal in
+    worlds that others change, too; ``progress`` is told each refinement as it is made.
     The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
     Raises :class:`BbtcError` for input that is wrong and an unknown strategy, :class:`LimitReached` where the
     limits allow no tree at all, and ``ValueError`` for a target that is no probability.
@@ -126,7 +128,7 @@ def plan(
     from bbtc.plan.strategies import DEFAULT
 
     limits = limits or Limits()
-    options = Options(max_actions=max_actions, retries=retries)
+    options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
     tell = progress or (lambda _: None)
     task = _task(inputs, limits, report)
     return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)

@@ -56,6 +56,11 @@ STATUS_EXIT: dict[Status, int] = {
     show_default=True,
     help="Try again as often as the target takes, or without end (search, policy, auto).",
 )
+@click.option(
+    "--guarded",
+    is_flag=True,
+    help="Keep the checks that matter only where others change the world, too.",
+)
 @click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
 @click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
 @click.option("--verify", "verified", is_flag=True, help="Write the tree only if `bbtc verify` takes it.")
@@ -70,6 +75,7 @@ def command(
     strategy: str,
     max_actions: int | None,
     retries: Retries,
+    guarded: bool,
     bounds: bool,
     as_json: bool,
     verified: bool,
@@ -95,7 +101,7 @@ def command(
     if as_json and not bounds:
         raise click.UsageError("--json goes with --bounds: a tree is always written as JSON.")
     limits = session.limits
-    options = Options(max_actions=max_actions, retries=retries)
+    options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
     require_strategy(strategy, options if not bounds else DEFAULTS)
     session.expect_output(output, check=check)
     task = load_task(session, files, limits)

@@ -27,7 +27,8 @@ DEFAULT_OUTPUT = "build"
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
 _MOST = 1000  # expectations or exports of one tree
 _INPUTS = ("domain", "problem")
-_SETTINGS = (*_INPUTS, "target", "strategy", "max-actions", "retries", "limits", "exports", "expect")
+_PLANNING = ("target", "strategy", "max-actions", "retries", "guarded", "limits")
+_SETTINGS = (*_INPUTS, *_PLANNING, "exports", "expect")
 _LIMITS = {"time": "seconds", "states": "states", "nodes": "nodes", "ground-actions": "actions"}
 
 
@@ -59,6 +60,7 @@ class TreeEntry:
     strategy: str = DEFAULT
     max_actions: int | None = None
     retries: Retries = "least"
+    guarded: bool = False
     limits: tuple[tuple[str, int], ...] = ()
     exports: tuple[Export, ...] = ()
     expect: tuple[Expectation, ...] = ()
@@ -150,6 +152,7 @@ class _Reader:
             strategy=optional("strategy", lambda each: _text(each) and each.word(*STRATEGIES), DEFAULT),
             max_actions=optional("max-actions", _count, None),
             retries=optional("retries", _retries, "least"),
+            guarded=optional("guarded", At.flag, False),
             limits=optional("limits", self._limits, ()),
             exports=optional("exports", lambda each: self._exports(each, name), ()),
             expect=optional("expect", self._expectations, ()),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from importlib import import_module
 
@@ -44,6 +45,14 @@ def run_strategy(
     require_strategy(name, options)
     module, function = STRATEGIES[name]
     strategy: Strategy = getattr(import_module(module), function)
+    from bbtc.plan.guard import guarded, most_more
+
+    # Strategies need not know of guards: they change nothing in the simulation.
+    unguarded = replace(options, guarded=False)
+    if options.guarded:
+        limits = replace(limits, nodes=max(1, limits.nodes - most_more(task)))
     if name == "refine":
-        return strategy(task, target, limits, progress)
-    return strategy(task, target, limits, progress, options)
+        plan = strategy(task, target, limits, progress)
+    else:
+        plan = strategy(task, target, limits, progress, unguarded)
+    return guarded(plan, limits) if options.guarded else plan

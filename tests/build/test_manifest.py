@@ -34,6 +34,7 @@ trees:
     target: 19/20
     max-actions: 7
     retries: unbounded
+    guarded: true
     limits: {time: 60, states: 1000}
     exports:
       btcpp: trees/first.xml
@@ -67,6 +68,7 @@ problem = "p.pddl"
 target = 0.95
 max-actions = 7
 retries = "unbounded"
+guarded = true
 limits = {time = 60, states = 1000}
 expect = ["success >= 95%", "cost <= 7/2"]
 
@@ -102,6 +104,8 @@ def test_a_full_manifest_is_read() -> None:
     first, second = read(FULL).trees
     assert (first.name, first.inputs, first.file) == ("first", ("d.pddl", "p.pddl"), "out/first.tree.json")
     assert (first.target, first.strategy, first.max_actions) == (Fraction(19, 20), "auto", 7)
+    assert first.guarded
+    assert not second.guarded
     assert (first.retries, first.limits) == ("unbounded", (("states", 1000), ("seconds", 60)))
     assert [(e.name, e.form, e.file, e.options) for e in first.exports] == [
         ("btcpp", "btcpp", "trees/first.xml", ()),

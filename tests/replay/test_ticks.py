@@ -8,6 +8,9 @@ from collections.abc import Callable, Hashable
 
 import pytest
 
+from bbtc.limits import Limits
+from bbtc.pipeline import plan_task
+from bbtc.plan.options import Options
 from bbtc.replay.script import Values
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.long_form import amount
@@ -79,9 +82,12 @@ def test_plans_run_as_in_the_reference_whatever_changes(
             compared.add(trees=1)
 
 
+@pytest.mark.parametrize("options", [None, Options(guarded=True)], ids=["refine", "guarded"])
 @pytest.mark.parametrize("problem", QUICK, ids=str)
-def test_plans_of_refine_are_sound_whatever_changes(problem: Problem) -> None:
+def test_plans_are_sound_whatever_changes(problem: Problem, options: Options | None) -> None:
     tree, rng = plan_of(problem, "refine").tree, random.Random(1)
+    if options is not None:
+        tree = plan_task(tree.task, None, "auto", Limits(), lambda _: None, options=options).tree
     for _ in range(200):
         script = random_script(tree.task, rng, TICKS)
         world = WatchedWorld(tree.task, script)

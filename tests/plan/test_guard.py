@@ -1,0 +1,72 @@
+"""Guarded trees: the same runs in the simulation, with every precondition and the goal read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from bbtc.diagnostics import LimitReached
+from bbtc.ground.condition import TRUE, conjuncts
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.pipeline import plan_task, simulate_tree
+from bbtc.plan.options import Options
+from bbtc.plan.strategies import STRATEGIES
+from bbtc.tree.nodes import ConditionNode, ControlNode, Tree, actions_of, walk
+from bbtc.verify.verdict import verify
+from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.long_form import amount
+from tests.strategies import tasks
+
+
+def planned(task: Task, strategy: str, options: Options, limits: Limits | None = None) -> Tree:
+    return plan_task(task, None, strategy, limits or Limits(), lambda _: None, options=options).tree
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_guarded_trees_of_our_domains_succeed_as_often_at_the_same_cost(problem: Problem) -> None:
+    plain = plan_of(problem, "auto").tree
+    tree = planned(plain.task, "auto", Options(guarded=True))
+    assert (tree.success_probability, tree.status) == (plain.success_probability, plain.status)
+    ours, theirs = (simulate_tree(each, Limits())[0] for each in (tree, plain))
+    assert (ours.success, ours.cost, ours.actions) == (theirs.success, theirs.cost, theirs.actions)
+    assert ours.failure + ours.blocked == theirs.failure + theirs.blocked
+    for node in actions_of(tree.root):
+        assert node.guarded == (tree.task.action_by_name[node.action].precondition != TRUE)
+    goal = conjuncts(tree.task.goal)
+    assert isinstance(tree.root, ControlNode)
+    assert tree.root.kind == "sequence"
+    last = tree.root.children[-len(goal) :]
+    assert tuple(node.condition for node in last if isinstance(node, ConditionNode)) == goal
+    assert sum(1 for _ in walk(tree.root)) <= sum(1 for _ in walk(plain.root)) + len(goal) + 1
+    assert verify(tree, Limits(), "own").problems == ()
+
+
+@settings(max_examples=amount(60, 2000), deadline=None, suppress_health_check=list(HealthCheck))
+@given(task=tasks(), strategy=st.sampled_from(list(STRATEGIES)))
+def test_guards_cost_no_success(task: Task, strategy: str) -> None:
+    limits = Limits(seconds=20, states=20_000, nodes=200)
+    try:
+        plain = planned(task, strategy, Options(), limits)
+        # The limit on nodes counts the goal's checks.
+        room = replace(limits, nodes=limits.nodes + len(conjuncts(task.goal)) + 1)
+        tree = planned(task, strategy, Options(guarded=True), room)
+    except LimitReached:
+        return
+    assert tree.success_probability == plain.success_probability
+    assert verify(tree, Limits(), "own").problems == ()
+
+
+def test_what_a_limit_allows_is_guarded_too() -> None:
+    (problem,) = [each for each in PROBLEMS if str(each) == "doors/to-the-lab"]
+    task = plan_of(problem).tree.task
+    limits = Limits(nodes=12)
+    tree = planned(task, "refine", Options(guarded=True), limits)
+    assert tree.status == "limit-reached"
+    assert sum(1 for _ in walk(tree.root)) <= limits.nodes
+    assert tree.success_probability == simulate_tree(tree, Limits())[0].success
+    assert tree.success_probability < Fraction(1)
