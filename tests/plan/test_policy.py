@@ -68,9 +68,9 @@ def test_public_problems_are_solved_at_their_best(problem: Optimum) -> None:
         of = problem.task()
     except BbtcError as error:
         pytest.skip(f"does not load: {error.diagnostics[0].message}")
-    start = time.monotonic()
+    start = time.process_time()
     done = plan(of)
-    assert time.monotonic() - start < 10
+    assert time.process_time() - start < 10
     assert float(done.tree.success_probability) == pytest.approx(problem.best, abs=1e-6)
     assert (done.tree.status == "target-reached") == (done.tree.success_probability >= of.goal_probability)
     assert size(done) < 150
