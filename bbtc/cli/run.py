@@ -179,6 +179,7 @@ def _fitted(lines: list[str], height: int) -> list[str]:
 def _frame(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
     """One tick: what changed, the tree with what its nodes returned, and what may come."""
     from bbtc.cli.wording import changes
+    from bbtc.export.names import printable
     from bbtc.rounding import figure_text
 
     moments, now = stepper.moments, stepper.now
@@ -188,12 +189,12 @@ def _frame(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
         before = moments[-2]
         assert before.action is not None
         did = changes(tree, before.state.values, now.state.values)
-        head = [f"tick {len(moments)}: {before.action.action}: {did}"]
+        head = [f"tick {len(moments)}: {printable(before.action.action)}: {did}"]
     lines = [*head, *_tree_lines(tree, stepper, full)]
     if now.action is None:
         word = "blocked" if now.status.word == "running" else now.status.word
         return [*lines, f"end: {word}"]
-    lines.append(f"starts {now.action.action}; its outcomes:")
+    lines.append(f"starts {printable(now.action.action)}; its outcomes:")
     for number, branch in enumerate(now.branches, 1):
         did = changes(tree, now.state.values, branch.values)
         lines.append(f"  {number}. with probability {figure_text(branch.probability)}: {did}")

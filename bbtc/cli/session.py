@@ -46,10 +46,13 @@ class Session:
             self.line.erase()
 
     def say(self, text: str = "") -> None:
-        """A message for people, on stderr; silent where diagnostics are written for machines."""
+        """A message for people, one line on stderr; silent where diagnostics are written for machines. Names in it
+        may come from strangers: what would steer a terminal is replaced."""
+        from bbtc.export.names import printable
+
         if self.form == "text":
             self.clear()
-            click.echo(text, err=True)
+            click.echo(printable(text), err=True)
 
     def read(self, path: str) -> SourceFile:
         """A source file, ``-`` for stdin; remembered for ``--depfile``."""

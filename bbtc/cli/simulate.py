@@ -43,6 +43,7 @@ def command(
     from bbtc.belief.scenarios import scenarios as runs
     from bbtc.cli.inputs import tree_of
     from bbtc.cli.wording import figures_report
+    from bbtc.export.names import printable
     from bbtc.pipeline import simulate_tree
 
     session.expect_output(output)
@@ -66,7 +67,7 @@ def command(
             share = sampled.successes / sampled.samples
             lines.append(f"sampled   {share:.6g} of {sampled.samples} runs succeed (seed {sampled.seed})")
         lines.extend(_scenario_lines(loaded, listed))
-        write(output, "".join(f"{line}\n" for line in lines))
+        write(output, "".join(f"{printable(line)}\n" for line in lines))
     if stop is not None:
         raise stop
 

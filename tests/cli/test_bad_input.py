@@ -362,3 +362,20 @@ def test_every_limit_has_its_switch(folder: Path, switch: str, value: str, statu
     assert done.returncode == status, done.stderr
     assert told in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "command", [["simulate", "--scenarios", "3"], ["run", "--batch"], ["plan"], ["verify"]]
+)
+def test_a_hostile_name_does_not_steer_the_terminal(folder: Path, command: list[str]) -> None:
+    """Nor does it begin a line, where it could be a command to a CI system."""
+    made = "task.json" if command[0] == "plan" else "tree.json"
+    source = ["compile" if command[0] == "plan" else "plan", "domain.pddl", "problem.pddl", "-o", made]
+    assert bbtc(*source, folder=folder).returncode == 0
+    hostile = "\x1b]0;x\x07\u202e\u0085\n::error::x"
+    text = (folder / made).read_text().replace("soda", json.dumps(hostile)[1:-1])
+    (folder / made).write_text(text)
+    done = bbtc(command[0], made, *command[1:], folder=folder)
+    assert done.returncode == 0, done.stderr
+    shown = done.stderr if command[0] == "plan" else done.stdout + done.stderr
+    assert not [line for line in shown.split("\n") if not line.isprintable() or line.startswith("::")]
