@@ -17,6 +17,8 @@ CODES: dict[str, str] = {
     "BBT0006": "no domain, no problem, or more than one of them",
     "BBT0007": "a limit on time, states or nodes was reached",
     "BBT0008": "an artefact differs from what would be written",
+    "BBT0009": "output in the place of something else",
+    "BBT0010": "name that a depfile cannot hold",
     # 01xx: syntax
     "BBT0101": "syntax error",
     "BBT0102": "parenthesis never closed",
@@ -119,4 +121,6 @@ CODES: dict[str, str] = {
     "BBT1005": "expected figure not met",
     "BBT1006": "internal error in a build",
     "BBT1007": "file in the way of a new project",
+    "BBT1008": "link in the way of a build",
+    "BBT1009": "artefact in the place of a source",
 }

@@ -10,9 +10,9 @@ from typing import Any
 from bbtc.artefacts import task_to_json
 from bbtc.artefacts.tree_json import carried
 from bbtc.belief.simulate import Figures
-from bbtc.export.names import printable
 from bbtc.export.outline import label
 from bbtc.ground.task import Task
+from bbtc.printable import printable
 from bbtc.tree.difference import Difference, differences
 from bbtc.tree.nodes import Node, Tree, actions_of, walk
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from bbtc.codes import CODES
+from bbtc.printable import printable, printable_line
 from bbtc.source import Span
 
 
@@ -28,7 +29,8 @@ class Related:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One message. ``code`` is a key of :data:`bbtc.codes.CODES`."""
+    """One message. ``code`` is a key of :data:`bbtc.codes.CODES`. ``message`` and ``hint`` are one line each;
+    ``lines`` are those of a file, or of a difference, that are shown below the message."""
 
     code: str
     message: str
@@ -36,22 +38,28 @@ class Diagnostic:
     hint: str | None = None
     severity: Severity = Severity.ERROR
     related: tuple[Related, ...] = ()
+    lines: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.code not in CODES:
             raise ValueError(f"undocumented diagnostic code {self.code}")
 
+    @property
+    def told(self) -> str:
+        """The message with its lines. Nothing in it steers a terminal, whatever names it cites."""
+        return "\n".join([printable(self.message), *map(printable_line, self.lines)])
+
     def render(self) -> str:
         """The message as text: place, severity, code, excerpt with caret, hint."""
-        head = f"{self.severity.value}[{self.code}]: {self.message}"
-        lines = [f"{self.span.place}: {head}" if self.span else head]
+        head = f"{self.severity.value}[{self.code}]: {self.told}"
+        lines = [f"{printable(self.span.place)}: {head}" if self.span else head]
         if self.span:
             lines.append(self.span.excerpt())
         for related in self.related:
             place = f"{related.span.place}: " if related.span else ""
-            lines.append(f"  note: {place}{related.message}")
+            lines.append(printable(f"  note: {place}{related.message}"))
         if self.hint:
-            lines.append(f"  hint: {self.hint}")
+            lines.append(printable(f"  hint: {self.hint}"))
         return "\n".join(lines)
 
 

@@ -6,6 +6,8 @@ from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from bbtc.printable import printable_line
+
 _EXCERPT_WIDTH = 160
 
 
@@ -71,7 +73,7 @@ class Span(NamedTuple):
         length = min(length, max(1, len(shown) - (column - 1 - first)))
         # Tabs stay tabs in the caret line, so that it lines up whatever the tab width; other
         # control characters of a hostile file never reach the terminal.
-        clean = "".join(c if c == "\t" or c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in shown)
+        clean = printable_line(shown)
         pad = "".join("\t" if c == "\t" else " " for c in shown[: column - 1 - first])
         gutter = f"{line:5d} | "
         return f"{gutter}{clean}\n{' ' * (len(gutter) - 2)}| {pad}{'^' * length}"

@@ -13,6 +13,7 @@ from typing import TypeAlias, TypeVar
 from bbtc.artefacts.jsontext import Path, locate, path_text
 from bbtc.artefacts.numbers import MAX_LENGTH, parse_number
 from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.printable import printable
 from bbtc.rounding import too_long
 from bbtc.source import SourceFile, Span
 
@@ -247,12 +248,7 @@ def _kind(value: object) -> str:
 
 def clip(text: str) -> str:
     """Text of a stranger for a message: printable and not too long."""
-    return legible(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…")
-
-
-def legible(text: str) -> str:
-    """A message that cites a stranger: printable."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return printable(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…")
 
 
 def nearest(name: str, known: Sequence[str]) -> str | None:

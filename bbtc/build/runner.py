@@ -14,18 +14,19 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from bbtc.build.state import (
     Contents,
+    Held,
     Step,
     Steps,
+    cannot_build,
     load_state,
     plugin_version,
-    save_state,
-    scratch_folder,
     settings_digest,
     sole_builder,
     tool_version,
 )
 from bbtc.diagnostics import BbtcError, Diagnostic
-from bbtc.files import write
+from bbtc.files import reason, relative_parts, write
+from bbtc.folder import Batch
 from bbtc.manifest.find import manifest_bytes, source_name
 
 if TYPE_CHECKING:
@@ -90,19 +91,19 @@ def build(
     tree is part of its outcome. ``KeyboardInterrupt`` leaves what was built until then.
     """
     manifest = manifest.absolute()
-    holding = contextlib.nullcontext() if check else sole_builder(manifest.parent)
-    with holding:
-        return _Builder(manifest, jobs, check, tell or (lambda *_: None)).run(names, force)
+    with contextlib.ExitStack() as stack:
+        held = None if check else stack.enter_context(sole_builder(manifest.parent))
+        return _Builder(manifest, jobs, held, tell or (lambda *_: None)).run(names, force)
 
 
 class _Builder:
-    """One build."""
+    """One build; nothing is written unless its folder is held."""
 
-    def __init__(self, file: Path, jobs: int | None, check: bool, tell: Tell) -> None:
+    def __init__(self, file: Path, jobs: int | None, held: Held | None, tell: Tell) -> None:
         self.file = file
         self.folder = file.parent
         self.jobs = jobs
-        self.check = check
+        self.held = held
         self.tell = tell
         self.contents = Contents(self.folder)
         self.state = load_state(self.folder)
@@ -145,6 +146,7 @@ class _Builder:
         self.state.manifest = manifest_digest
         self.state.trees = {entry.name: self.state.trees.get(entry.name, {}) for entry in manifest.trees}
         entries = {entry.name: entry for entry in _chosen(manifest, names)}
+        require_apart(manifest)
         outcomes: dict[str, Outcome] = {}
         jobs: list[Job] = []
         for entry in manifest.trees:
@@ -227,15 +229,12 @@ class _Builder:
         diagnostics = [*made.diagnostics, *complaints(entry, made)]
         if made.failure is not None:
             return Outcome(entry.name, "failed", (), tuple(diagnostics), made.failure)
+        everything = {path: data for files in made.steps.values() for path, data in files.items()}
         changed: list[str] = []
-        for files in made.steps.values():
-            for path, data in files.items():
-                try:
-                    changed.extend([path] if self._write(path, data) else [])
-                except BbtcError as error:
-                    diagnostics.extend(error.diagnostics)
-        if len(diagnostics) > len(made.diagnostics):
-            return Outcome(entry.name, "failed", tuple(changed), tuple(diagnostics), "error")
+        try:
+            changed = self._compare(everything) if self.held is None else self._write(self.held, everything)
+        except BbtcError as error:
+            return Outcome(entry.name, "failed", (), (*diagnostics, *error.diagnostics), "error")
         done = self.fresh[entry.name]
         for name, files in made.steps.items():
             inputs = entry.inputs if name == TREE else (entry.file,)
@@ -245,21 +244,63 @@ class _Builder:
         self.state.trees[entry.name] = done
         return Outcome(entry.name, "built", tuple(changed), tuple(diagnostics), summary=made.summary)
 
-    def _write(self, path: str, data: bytes) -> bool:
-        whole = self.folder / path
-        if not self.check:
+    def _compare(self, files: Mapping[str, bytes]) -> list[str]:
+        """Raise :class:`BbtcError` with every difference between files and what would be written."""
+        found: list[Diagnostic] = []
+        for path, data in files.items():
             try:
-                whole.parent.mkdir(parents=True, exist_ok=True)
+                write(source_name(self.folder, path), data, check=True)
+            except BbtcError as error:
+                found.extend(error.diagnostics)
+        if found:
+            raise BbtcError(found)
+        return []
+
+    def _write(self, held: Held, files: Mapping[str, bytes]) -> list[str]:
+        """Write the files of a tree, all or none; those that changed. Raises :class:`BbtcError`."""
+        changed = []
+        with Batch(held.scratch) as batch:
+            path = ""
+            try:
+                for path, data in files.items():
+                    *above, name = relative_parts(path)
+                    folder = batch.below(held.project, tuple(above))
+                    if folder.status(name) is None or folder.read(name, len(data) + 1) != data:
+                        batch.put(folder, name, data)
+                        changed.append(path)
+                path = ", ".join(changed)
+                batch.commit()
             except OSError as error:
-                raise BbtcError.single("BBT0004", f"cannot write {whole}: {error.strerror}") from error
-        shown = source_name(self.folder, path)
-        return write(shown, data, check=self.check, scratch=scratch_folder(self.folder))
+                raise cannot_build(source_name(self.folder, path), error) from error
+        return changed
 
     def _save(self, *, now: bool) -> None:
-        if self.check or (not now and time.monotonic() - self.saved < _SAVE_EVERY):
+        if self.held is None or (not now and time.monotonic() - self.saved < _SAVE_EVERY):
             return
-        save_state(self.folder, self.state)
+        self.held.save(self.state)
         self.saved = time.monotonic()
+
+
+def require_apart(manifest: Manifest) -> None:
+    """Raise :class:`BbtcError` where something that is to be made is, by another name, the manifest or an
+    input of a tree. (What has the same name is told when the manifest is read.)"""
+    sources = {}
+    for path in (manifest.file.name, *(path for entry in manifest.trees for path in entry.inputs)):
+        with contextlib.suppress(OSError, ValueError):
+            status = (manifest.folder / path).stat()
+            sources[status.st_dev, status.st_ino] = path
+    found = []
+    for entry in manifest.trees:
+        for file, span in ((entry.file, entry.span), *((e.file, e.span) for e in entry.exports)):
+            with contextlib.suppress(OSError, ValueError):
+                status = (manifest.folder / file).stat()
+                source = sources.get((status.st_dev, status.st_ino))
+                if source is not None:
+                    found.append(
+                        Diagnostic("BBT1009", f"{file} is the source {source} by another name", span)
+                    )
+    if found:
+        raise BbtcError(found)
 
 
 def sources_of(manifest: Path) -> list[Path]:
@@ -289,11 +330,10 @@ def _sources(contents: Contents, entry: TreeEntry) -> tuple[tuple[str, bytes], .
     for number, path in enumerate(entry.inputs):
         shown = source_name(contents.folder, path)
         try:
-            sources.append((shown, contents.read(path)))
+            sources.append((shown, contents.source(path)))
         except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
             span = entry.input_spans[number] if entry.input_spans else entry.span
-            raise BbtcError.single("BBT0001", f"cannot read {shown}: {reason}", span) from error
+            raise BbtcError.single("BBT0001", f"cannot read {shown}: {reason(error)}", span) from error
     return tuple(sources)
 
 

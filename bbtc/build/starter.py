@@ -18,7 +18,7 @@ def make_project(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     makes nothing where one of them is there already (BBT1007) or cannot be written."""
     root = Path(folder)
     paths = tuple(root / name for name in NAMES)
-    taken = [path for path in paths if path.exists()]
+    taken = [path for path in paths if os.path.lexists(path)]  # a link that leads nowhere, too
     if taken:
         raise BbtcError(
             Diagnostic("BBT1007", f"{path} is there already", hint="choose another folder") for path in taken

@@ -3,11 +3,15 @@
 The state stands in ``.bbtc/`` beside the manifest, which is nobody's source: it can be deleted at any time,
 and everything is built again. A step is up to date if the digest of its settings, the contents of its
 inputs and those of its outputs are all what they were.
+
+A state counts only in the folder that it was written in: it names the lock beside it by what the system gave
+that file when it was made. One that came along with a stranger's project is none.
 """
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import os
@@ -17,13 +21,19 @@ from pathlib import Path
 from typing import Any
 
 from bbtc.diagnostics import BbtcError
-from bbtc.files import write
+from bbtc.files import cannot_write, read_file, reason
+from bbtc.folder import LINK, Batch, Folder, leftovers
+from bbtc.limits import Limits
 from bbtc.version import __version__
 
 FOLDER = ".bbtc"
 _FORMAT = "bbtc-build"
 _VERSION = 1
 _DIGEST = 64  # characters
+_LOCK = "lock"
+_STATE = "state.json"
+_MOST_BYTES = 1 << 30
+"""Largest file that is looked at: a state, or an artefact that was made before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +112,18 @@ class Contents:
         self._prefix = os.path.join(folder, "")  # noqa: PTH118 - thousands of paths are made of it
         self._digests: dict[str, str | None] = {}
 
-    def read(self, path: str) -> bytes:
-        """The content of a file. Raises ``OSError``."""
-        with open(self._prefix + path, "rb") as stream:  # noqa: PTH123 - the same
-            data = stream.read()
+    def read(self, path: str, most: int = _MOST_BYTES) -> bytes:
+        """The content of a file. Raises ``OSError``, also where it has more bytes than ``most``."""
+        whole = path if os.path.isabs(path) else self._prefix + path  # noqa: PTH117 - as above
+        data = read_file(whole, most + 1)
+        if len(data) > most:
+            raise OSError(errno.EFBIG, f"it is larger than {most >> 20} MiB")
         self._digests[path] = digest(data)
         return data
+
+    def source(self, path: str) -> bytes:
+        """The content of a file that something is made from. Raises ``OSError``."""
+        return self.read(path, Limits().file_bytes)
 
     def digest(self, path: str) -> str | None:
         """The digest of a file; None where it cannot be read."""
@@ -136,10 +152,10 @@ class Contents:
 
 
 def load_state(folder: Path) -> State:
-    """The state of a project; an empty one where there is none, or none that this version reads."""
+    """The state of a project; an empty one where there is none, or none that this version wrote here."""
     try:
-        data = json.loads((folder / FOLDER / "state.json").read_bytes())
-        if data["format"] != _FORMAT or data["version"] != _VERSION:
+        data = json.loads(read_file(folder / FOLDER / _STATE, _MOST_BYTES))
+        if data["format"] != _FORMAT or data["version"] != _VERSION or data["lock"] != _lock_id(folder):
             return State()
         return State(
             {str(name): str(text) for name, text in data["versions"].items()},
@@ -153,6 +169,13 @@ def load_state(folder: Path) -> State:
         return State()
 
 
+def _lock_id(folder: Path) -> list[int]:
+    """What the system gave the lock, and gives no copy of it: its number, and the time of its making (no
+    time of a file that a user can set). Raises ``OSError``."""
+    status = (folder / FOLDER / _LOCK).lstat()
+    return [status.st_ino, status.st_ctime_ns]
+
+
 def _step(value: Any) -> Step:
     settings, inputs, outputs = value
     for files in (inputs, outputs):
@@ -161,44 +184,55 @@ def _step(value: Any) -> Step:
     return Step(settings, inputs, outputs)
 
 
-def save_state(folder: Path, state: State) -> None:
-    """Write the state. A project whose folder cannot be written keeps none."""
-    value = {
-        "format": _FORMAT,
-        "version": _VERSION,
-        "versions": dict(state.versions),
-        "manifest": state.manifest,
-        "trees": {
-            name: {
-                step: [done.settings, dict(done.inputs), dict(done.outputs)] for step, done in steps.items()
-            }
-            for name, steps in state.trees.items()
-        },
-    }
-    with contextlib.suppress(BbtcError):
-        write(str(folder / FOLDER / "state.json"), json.dumps(value), scratch=scratch_folder(folder))
+# --- the folder of a project, held for one build ---------------------------------------------
 
 
-def scratch_folder(folder: Path) -> str:
-    """Where files are written before they are renamed to their places."""
-    return str(folder / FOLDER / "scratch")
+@dataclass(frozen=True, slots=True)
+class Held:
+    """The folder of a project, its ``.bbtc``, and where files are written aside, all held open."""
+
+    path: Path
+    project: Folder
+    own: Folder
+    scratch: Folder
+
+    def save(self, state: State) -> None:
+        """Write the state. A project that it cannot be written in keeps the one it has."""
+        value = {
+            "format": _FORMAT,
+            "version": _VERSION,
+            "lock": _lock_id(self.path),
+            "versions": dict(state.versions),
+            "manifest": state.manifest,
+            "trees": {
+                name: {
+                    step: [done.settings, dict(done.inputs), dict(done.outputs)]
+                    for step, done in steps.items()
+                }
+                for name, steps in state.trees.items()
+            },
+        }
+        with contextlib.suppress(OSError), Batch(self.scratch) as batch:
+            batch.put(self.own, _STATE, json.dumps(value).encode())
+            batch.commit()
 
 
 @contextlib.contextmanager
-def sole_builder(folder: Path) -> Iterator[None]:
-    """Hold the project for one build: another one waits. What a killed build left is cleared away.
+def sole_builder(folder: Path) -> Iterator[Held]:
+    """Hold the project for one build: another one waits. What a killed build left is cleared away. Below the
+    folder no link is followed.
 
-    Raises :class:`BbtcError` if the folder cannot be written."""
-    own = folder / FOLDER
-    try:
-        (own / "scratch").mkdir(parents=True, exist_ok=True)
-        ignore = own / ".gitignore"
-        if not ignore.exists():
-            ignore.write_text("*\n")
-        lock = (own / "lock").open("wb")
-    except OSError as error:
-        raise BbtcError.single("BBT0004", f"cannot write {own}: {error.strerror}") from error
-    with lock:
+    Raises :class:`BbtcError` if the folder cannot be written, or a link is in the way."""
+    with contextlib.ExitStack() as stack:
+        try:
+            project = stack.enter_context(Folder(str(folder)))
+            own = stack.enter_context(project.sub(FOLDER, make=True))
+            scratch = stack.enter_context(own.sub("scratch", make=True))
+            _ignore_itself(own, scratch)
+            lock = own.open(_LOCK, os.O_RDWR | os.O_CREAT)
+        except OSError as error:
+            raise cannot_build(str(folder / FOLDER), error) from error
+        stack.callback(os.close, lock)
         try:
             import fcntl
         except ImportError:  # no such locks on this system
@@ -206,7 +240,23 @@ def sole_builder(folder: Path) -> Iterator[None]:
         else:
             with contextlib.suppress(OSError):
                 fcntl.flock(lock, fcntl.LOCK_EX)
-        for left in (own / "scratch").iterdir():
+        for left in leftovers(scratch):
             with contextlib.suppress(OSError):
-                left.unlink()
-        yield
+                scratch.remove(left)
+        yield Held(folder, project, own, scratch)
+
+
+def _ignore_itself(own: Folder, scratch: Folder) -> None:
+    if own.status(".gitignore") is None:
+        with Batch(scratch) as batch:
+            batch.put(own, ".gitignore", b"*\n")
+            batch.commit()
+
+
+def cannot_build(path: str, error: OSError) -> BbtcError:
+    """The error for a file or folder of a project that cannot be written to."""
+    if error.strerror != LINK:
+        return cannot_write(path, reason(error))
+    hint = "a build writes through no link: put a file or folder in its place, or name another one"
+    at = f": {error.filename}" if error.filename else ""
+    return BbtcError.single("BBT1008", f"cannot write {path}: {LINK}{at}", hint=hint)

@@ -32,7 +32,7 @@ def command(
     """Parse, check and ground the PROBLEM of DOMAIN, and write the task as JSON (or what --emit says)."""
     from bbtc import artefacts, pipeline
 
-    session.expect_output(output, check=check)
+    session.expect_output(output, files, check=check, depfile=depfile)
     sources = [session.read(file) for file in files]
     if emit in {"ground", "prism", "jani"}:
         task = pipeline.compile_sources(sources, session.report, session.limits, checks=True)

@@ -6,7 +6,6 @@ import click
 
 from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
-from bbtc.files import write
 
 
 @click.command("diff")
@@ -30,9 +29,10 @@ def command(session: Session, old: str, new: str, form: str, exit_code: bool, ou
     from bbtc.cli.inputs import tree_of
     from bbtc.pipeline import compare_trees
 
+    session.expect_output(output, [old, new])
     first, second = (tree_of(session.read(path)) for path in (old, new))
     comparison = compare_trees(first, second, session.limits)
     session.clear()
     lines = markdown_report(comparison) if form == "markdown" else text_report(comparison)
-    write(output, "".join(f"{line}\n" for line in lines))
+    session.write(output, "".join(f"{line}\n" for line in lines))
     return int(exit_code and comparison.differs)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from bbtc.cli.wording import counted, exact
 from bbtc.comparison import Comparison, FigureChange
-from bbtc.export.names import printable
 from bbtc.export.outline import UNICODE, label, outline
+from bbtc.printable import printable
 from bbtc.rounding import decimal
 from bbtc.tree.difference import Difference, counts
 from bbtc.tree.nodes import walk

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 import click
@@ -76,7 +76,7 @@ def command(
     from bbtc.plan.strategies import require_strategy
 
     pairs = dict(_pair(option) for option in options)
-    require_place(session, form, pairs, output, check=check)
+    require_place(session, form, pairs, output, files, check=check, depfile=depfile)
     require_strategy(strategy, DEFAULTS)
     limits = session.limits
     sources = [session.read(file) for file in files]
@@ -94,10 +94,17 @@ def command(
 
 
 def require_place(
-    session: Session, form: str, options: Mapping[str, str], output: str, *, check: bool
+    session: Session,
+    form: str,
+    options: Mapping[str, str],
+    output: str,
+    inputs: Sequence[str],
+    *,
+    check: bool,
+    depfile: str | None,
 ) -> None:
-    """Refuse, before any work, an unknown format or option, a place that cannot be written to,
-    several files on stdout, and pixels on a terminal."""
+    """Refuse, before any work, an unknown format or option, a place that cannot be written to or is
+    that of an input, several files on stdout, and pixels on a terminal."""
     from bbtc.export.registry import load_exporter, parse_options
 
     exporter = load_exporter(form)
@@ -106,7 +113,7 @@ def require_place(
         raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
     if output == "-" and form == "png" and sys.stdout.isatty():
         raise click.UsageError("The format 'png' is no text: name a file with -o.")
-    session.expect_output(output, folder=not exporter.suffix, check=check)
+    session.expect_output(output, inputs, folder=not exporter.suffix, check=check, depfile=depfile)
 
 
 def _pair(option: str) -> tuple[str, str]:

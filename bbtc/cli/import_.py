@@ -34,7 +34,7 @@ def command(
     DOMAIN and PROBLEM, a compiled TASK, or the TREE that was exported."""
     from bbtc.pipeline import export_tree, import_tree
 
-    require_place(session, form, {}, output, check=check)
+    require_place(session, form, {}, output, (file, *others), check=check, depfile=depfile)
     sources = [session.read(path) for path in (file, *others)]
     tree = import_tree(sources[0], sources[1:], session.report, session.limits, namespace)
     artefact = export_tree(tree, form, {}, session.limits)

@@ -23,7 +23,6 @@ from bbtc.cli.session import (
     command as session_command,
 )
 from bbtc.cli.verify import require_verified
-from bbtc.files import write
 from bbtc.plan.strategies import DEFAULT
 
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ def command(
     limits = session.limits
     options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
     require_strategy(strategy, options if not bounds else DEFAULTS)
-    session.expect_output(output, check=check)
+    session.expect_output(output, files, check=check and not bounds, depfile=None if bounds else depfile)
     task = load_task(session, files, limits)
     if bounds:
         wanted = task.goal_probability if target is None else target
@@ -126,7 +125,7 @@ def _print_bounds(
         value = task_value(task, session.limits, options, costs=True)
     session.clear()
     text = bounds_json(value, target) if as_json else bounds_report(task, value, target)
-    write(output, text)
+    session.write(output, text)
     if value.lower >= target:
         return 0
     if value.interrupted:

@@ -50,7 +50,7 @@ def _as_json(diagnostic: Diagnostic) -> dict[str, object]:
         "code": diagnostic.code,
         "title": CODES[diagnostic.code],
         "severity": diagnostic.severity.value,
-        "message": diagnostic.message,
+        "message": "\n".join([diagnostic.message, *diagnostic.lines]),
         "hint": diagnostic.hint,
         "place": _place(diagnostic.span) or None,
     }
@@ -91,7 +91,7 @@ def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
 
 
 def _sarif_result(diagnostic: Diagnostic, rule: int) -> dict[str, object]:
-    text = diagnostic.message + (f"\nhint: {diagnostic.hint}" if diagnostic.hint else "")
+    text = diagnostic.told + (f"\nhint: {diagnostic.hint}" if diagnostic.hint else "")
     result: dict[str, object] = {
         "ruleId": diagnostic.code,
         "ruleIndex": rule,
@@ -119,7 +119,7 @@ def _as_github(diagnostic: Diagnostic) -> str:
             "endColumn": str(region["endColumn"]),
             **properties,
         }
-    text = diagnostic.message + (f"\nhint: {diagnostic.hint}" if diagnostic.hint else "")
+    text = diagnostic.told + (f"\nhint: {diagnostic.hint}" if diagnostic.hint else "")
     listed = ",".join(f"{key}={_escape(value, ':,')}" for key, value in properties.items())
     return f"::{level} {listed}::{_escape(text)}"
 

@@ -179,7 +179,7 @@ def _fitted(lines: list[str], height: int) -> list[str]:
 def _frame(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
     """One tick: what changed, the tree with what its nodes returned, and what may come."""
     from bbtc.cli.wording import changes
-    from bbtc.export.names import printable
+    from bbtc.printable import printable
     from bbtc.rounding import figure_text
 
     moments, now = stepper.moments, stepper.now
@@ -227,8 +227,8 @@ def _tree_lines(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
 
 
 def _state(tree: Tree, values: bytes) -> str:
-    from bbtc.export.names import printable
     from bbtc.kleene import Truth
+    from bbtc.printable import printable
 
     pairs = zip(tree.task.variables, values, strict=True)
     return printable(", ".join(f"{variable.name} = {Truth(value).word}" for variable, value in pairs))

@@ -16,8 +16,9 @@ from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
-from bbtc.files import require_writable, write, write_depfile, write_files
+from bbtc.files import Outputs, require_apart, require_writable
 from bbtc.limits import Limits
+from bbtc.printable import printable
 from bbtc.source import SourceFile
 
 if TYPE_CHECKING:
@@ -46,10 +47,8 @@ class Session:
             self.line.erase()
 
     def say(self, text: str = "") -> None:
-        """A message for people, one line on stderr; silent where diagnostics are written for machines. Names in it
-        may come from strangers: what would steer a terminal is replaced."""
-        from bbtc.export.names import printable
-
+        """A message for people, one line on stderr; silent where diagnostics are written for machines. Names
+        in it may come from strangers: what would steer a terminal is replaced."""
         if self.form == "text":
             self.clear()
             click.echo(printable(text), err=True)
@@ -61,20 +60,41 @@ class Session:
         self.inputs.append(path)
         return read_source(path, self.limits.file_bytes)
 
-    def expect_output(self, output: str, *, folder: bool = False, check: bool = False) -> None:
-        """Refuse, before any work, a place that :meth:`write` could not write to."""
-        if not check:
-            require_writable(output, folder=folder)
-
-    def write(self, output: str, artefact: Artefact, *, check: bool, depfile: str | None) -> None:
-        """Write what a command made, as ``-o``, ``--check`` and ``--depfile`` ask."""
-        self.clear()
-        if isinstance(artefact, str | bytes):
-            write(output, artefact, check=check)
-        else:
-            write_files(output, artefact.texts, check=check)
+    def expect_output(
+        self,
+        output: str,
+        inputs: Sequence[str],
+        *,
+        folder: bool = False,
+        check: bool = False,
+        depfile: str | None = None,
+    ) -> None:
+        """Refuse, before any work, a place that :meth:`write` could not write to, or where it would overwrite
+        an input."""
+        if check:
+            return
+        places = [output] if depfile is None else [output, depfile]
+        require_apart(places, inputs)
+        require_writable(output, folder=folder)
         if depfile is not None:
-            write_depfile(depfile, output, self.inputs)
+            require_writable(depfile)
+            _rule(output, inputs)
+
+    def write(
+        self, output: str, artefact: Artefact, *, check: bool = False, depfile: str | None = None
+    ) -> None:
+        """Write what a command made, as ``-o``, ``--check`` and ``--depfile`` ask: all of it, or nothing."""
+        self.clear()
+        outputs = Outputs(check)
+        if isinstance(artefact, str | bytes):
+            outputs.add(output, artefact)
+        else:
+            outputs.add_files(output, artefact.texts)
+        if not check:
+            if depfile is not None:
+                outputs.add(depfile, _rule(output, self.inputs))
+            require_apart(outputs.paths, self.inputs)
+        outputs.write()
 
     def show(self, diagnostics: Sequence[Diagnostic]) -> None:
         """Write diagnostics to stderr in the session's form (the machine forms even if empty)."""
@@ -85,8 +105,14 @@ class Session:
             click.echo(text, err=True, nl=False, color=color)
 
 
-# What is wrong with the command line itself: a strategy, a format or an option of theirs.
-_WRONG_USAGE = frozenset({"BBT0501", "BBT0503", "BBT0701", "BBT0704"})
+def _rule(output: str, inputs: Sequence[str]) -> bytes:
+    from bbtc.depfile import depfile
+
+    return depfile(output, inputs)
+
+
+# What is wrong with the command line itself: a strategy, a format or an option of theirs, an output.
+_WRONG_USAGE = frozenset({"BBT0009", "BBT0501", "BBT0503", "BBT0701", "BBT0704"})
 
 
 def _fail(session: Session, error: BbtcError) -> NoReturn:

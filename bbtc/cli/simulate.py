@@ -10,7 +10,6 @@ import click
 from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
 from bbtc.diagnostics import LimitReached
-from bbtc.files import write
 
 if TYPE_CHECKING:
     from bbtc.belief.scenarios import Scenario
@@ -43,10 +42,10 @@ def command(
     from bbtc.belief.scenarios import scenarios as runs
     from bbtc.cli.inputs import tree_of
     from bbtc.cli.wording import figures_report
-    from bbtc.export.names import printable
     from bbtc.pipeline import simulate_tree
+    from bbtc.printable import printable
 
-    session.expect_output(output)
+    session.expect_output(output, [tree])
     loaded = tree_of(session.read(tree))
     limits = session.limits
     figures, chain = simulate_tree(loaded, limits)
@@ -60,14 +59,14 @@ def command(
         stop = reached
     sampled = sample(chain, samples, seed, limits) if samples else None
     if as_json:
-        write(output, artefacts.dumps(artefacts.figures_to_json(loaded, figures, listed, sampled)))
+        session.write(output, artefacts.dumps(artefacts.figures_to_json(loaded, figures, listed, sampled)))
     else:
         lines = figures_report(loaded, figures)
         if sampled is not None:
             share = sampled.successes / sampled.samples
             lines.append(f"sampled   {share:.6g} of {sampled.samples} runs succeed (seed {sampled.seed})")
         lines.extend(_scenario_lines(loaded, listed))
-        write(output, "".join(f"{printable(line)}\n" for line in lines))
+        session.write(output, "".join(f"{printable(line)}\n" for line in lines))
     if stop is not None:
         raise stop
 

@@ -8,7 +8,6 @@ import click
 
 from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
-from bbtc.files import write
 
 if TYPE_CHECKING:
     from bbtc.tree.nodes import Tree
@@ -38,11 +37,12 @@ def command(session: Session, tree: str, engine: Engine, as_json: bool, output: 
     from bbtc.cli.inputs import tree_of
     from bbtc.pipeline import verify_tree
 
+    session.expect_output(output, [tree])
     verdict = verify_tree(tree_of(session.read(tree)), session.limits, engine)
     if as_json:
-        write(output, artefacts.dumps(artefacts.verdict_to_json(verdict)))
+        session.write(output, artefacts.dumps(artefacts.verdict_to_json(verdict)))
     else:
-        write(output, "".join(f"{line}\n" for line in verdict_report(verdict)))
+        session.write(output, "".join(f"{line}\n" for line in verdict_report(verdict)))
     verdict.raise_problems()
 
 

@@ -8,11 +8,11 @@ from bbtc.artefacts.numbers import exact
 from bbtc.belief.simulate import Figures
 from bbtc.belief.tick import Status
 from bbtc.cli.counting import counted
-from bbtc.export.names import printable
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
 from bbtc.plan.result import Plan, Refinement
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree, retries_of, walk
 
 __all__ = [

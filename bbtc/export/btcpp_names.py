@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 from bbtc.export.btcpp_idioms import LATCH, SKIPPER
 from bbtc.export.interface import Interface, interface_of
-from bbtc.export.names import Namer, Symbol, camel, identifiers, port_values, printable
+from bbtc.export.names import Namer, Symbol, camel, identifiers, port_values
 from bbtc.ground.task import Task
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 
 RESERVED = frozenset(

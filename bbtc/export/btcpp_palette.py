@@ -12,9 +12,9 @@ from bbtc.export.btcpp_idioms import LATCH, SKIPPER, Profile
 from bbtc.export.btcpp_names import BtcppNames, btcpp_names
 from bbtc.export.btcpp_options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
 from bbtc.export.interface import Leaf, variable_symbol
-from bbtc.export.names import printable
 from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.ground.task import Task
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 
 _MOST_OBJECTS = 8

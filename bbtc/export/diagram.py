@@ -16,10 +16,10 @@ from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.export.names import printable
 from bbtc.export.outline import UNICODE
 from bbtc.export.registry import Figures, Option
 from bbtc.ground.describe import describe
+from bbtc.printable import printable
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 
 Kind: TypeAlias = Literal["control", "condition", "action", "expanded", "collapsed"]

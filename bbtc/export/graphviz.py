@@ -32,8 +32,8 @@ from bbtc.export.diagram import (
     line_width,
     symbols_used,
 )
-from bbtc.export.names import printable
 from bbtc.export.registry import Figures, Option, OptionValue
+from bbtc.printable import printable
 from bbtc.tree.nodes import ControlKind, Tree
 
 FONT = "Helvetica,Arial,sans-serif"

@@ -6,10 +6,10 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bbtc.export.names import printable
 from bbtc.export.prism import FORM, readable_names, tree_program
 from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.ground.task import Task
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 from bbtc.verify.jani import jani_model
 from bbtc.verify.process import process_of

@@ -123,14 +123,6 @@ def snake(text: str) -> str:
     return _base(text, "snake")
 
 
-def printable(text: str) -> str:
-    """The text on one line, with a replacement character for whatever does not print (among it
-    all that XML 1.0 cannot hold)."""
-    return "".join(
-        c if c.isprintable() and c not in "\ufffe\uffff" else "\N{REPLACEMENT CHARACTER}" for c in text
-    )
-
-
 class Namer:
     """Hands out names, never the same twice."""
 

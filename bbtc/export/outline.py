@@ -8,9 +8,9 @@ from types import MappingProxyType
 
 from typing_extensions import assert_never
 
-from bbtc.export.names import printable
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
+from bbtc.printable import printable
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node
 
 

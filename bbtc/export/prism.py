@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from typing_extensions import assert_never
 
-from bbtc.export.names import Namer, printable, snake
+from bbtc.export.names import Namer, snake
 from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.ground.task import Task
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 from bbtc.verify.chain import MOST_WRITTEN, Form, chain_of
 from bbtc.verify.naming import Names

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing_extensions import assert_never
 
 from bbtc.export.interface import Interface, action_symbol, guard_of, interface_of, variable_symbol
-from bbtc.export.names import PYTHON_RESERVED, Symbol, identifiers, printable
+from bbtc.export.names import PYTHON_RESERVED, Symbol, identifiers
 from bbtc.export.pycode import Code, Group, Prefixed, call, layout, literal
 from bbtc.export.pytrees_parts import (
     ConditionCode,
@@ -28,6 +28,7 @@ from bbtc.export.registry import Figures, Option, OptionValue
 from bbtc.export.shape import fit, normal, words_of
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
+from bbtc.printable import printable
 from bbtc.tree.nodes import (
     ActionNode,
     ConditionNode,

@@ -9,7 +9,6 @@ from types import MappingProxyType
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import BbtcError
-from bbtc.export.names import printable
 from bbtc.ground.condition import (
     FALSE,
     TRUE,
@@ -27,6 +26,7 @@ from bbtc.ground.condition import (
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task, Variable, ground_name
 from bbtc.kleene import Truth
+from bbtc.printable import printable
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, tree_depth
 
 DEEPEST_TREE = 250

@@ -19,8 +19,8 @@ from bbtc.export.diagram import (
     line_width,
     symbols_used,
 )
-from bbtc.export.names import printable
 from bbtc.export.svg_layout import Box, tidy
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 
 _FONT = "Helvetica, Arial, sans-serif"

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError
+from bbtc.files import read_file, reason
 
 YAML_NAME = "bbtc.yaml"
 TOML_NAME = "pyproject.toml"
@@ -43,7 +44,7 @@ def is_manifest(file: Path) -> bool:
     if file.name != TOML_NAME:
         return True
     try:
-        return _TABLE.search(file.read_bytes()) is not None
+        return _TABLE.search(read_file(file, MAX_BYTES)) is not None
     except OSError:
         return False
 
@@ -51,10 +52,9 @@ def is_manifest(file: Path) -> bool:
 def manifest_bytes(file: Path) -> bytes:
     """The content of a manifest. Raises :class:`BbtcError` if it cannot be read or is too large."""
     try:
-        with file.open("rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+        data = read_file(file, MAX_BYTES + 1)
     except OSError as error:
-        raise BbtcError.single("BBT0001", f"cannot read {file}: {error.strerror}") from error
+        raise BbtcError.single("BBT0001", f"cannot read {file}: {reason(error)}") from error
     if len(data) > MAX_BYTES:
         raise BbtcError.single("BBT0005", f"{file} is larger than {MAX_BYTES >> 20} MiB")
     return data

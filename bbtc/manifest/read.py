@@ -9,14 +9,16 @@ from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 
-from bbtc.artefacts.cursor import At, Fault, Faults, clip, legible, run_reader
+from bbtc.artefacts.cursor import At, Fault, Faults, clip, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.diagnostics import BbtcError
 from bbtc.export.registry import Exporter, load_exporter, parse_options
 from bbtc.manifest.expectations import Expectation, parse_expectation
 from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
+from bbtc.manifest.places import Places
 from bbtc.plan.options import Retries
 from bbtc.plan.strategies import DEFAULT, STRATEGIES
+from bbtc.printable import printable
 from bbtc.source import Span
 from bbtc.syntax.reader import decode_source
 
@@ -94,15 +96,17 @@ def read_manifest(file: Path, data: bytes, shown: str | None = None) -> Manifest
     start = At(marked.value)
     for key in ("tool", "bbtc") if toml else ():
         start = dict(start.entries()).get(key, At({}, (*start.path, key)))
-    return run_reader(lambda faults: _Reader(marked, faults).manifest(start, file), None, marked.locate)
+    return run_reader(
+        lambda faults: _Reader(marked, faults, Places(file)).manifest(start, file), None, marked.locate
+    )
 
 
 @dataclass(slots=True)
 class _Reader:
     marked: Marked
     faults: Faults
+    places: Places
     output: str = DEFAULT_OUTPUT
-    owners: dict[str, str] = field(default_factory=dict)
     exporters: dict[str, Exporter] = field(default_factory=dict)
 
     def manifest(self, at: At, file: Path) -> Manifest:
@@ -121,6 +125,8 @@ class _Reader:
                 trees.append(self._tree(name, entry, defaults))
             except Fault as fault:
                 self.faults.add(fault)
+        for wrong in self.places.faults():
+            self.faults.add(wrong)
         return Manifest(file, tuple(trees))
 
     def _tree(self, name: str, at: At, defaults: dict[str, At]) -> TreeEntry:
@@ -139,7 +145,9 @@ class _Reader:
         file = f"{self.output}/{name}.tree.json"
         if "tree" in found:
             file = attempt(lambda: _inside(found["tree"]), file)
-        self._claim(found.get("tree", at), file, name)
+        self.places.claim(found.get("tree", at), file, name)
+        for path in inputs:
+            self.places.read(path)
 
         def optional(key: str, read: Callable[[At], _T], default: _T) -> _T:
             return attempt(lambda: read(found[key]), default) if key in found else default
@@ -171,7 +179,7 @@ class _Reader:
         try:
             return parse_expectation(_text(at), self.marked.span(at.path))
         except ValueError as error:
-            raise at.fault("BBT0604", legible(str(error))) from None
+            raise at.fault("BBT0604", printable(str(error))) from None
 
     # --- exports -----------------------------------------------------------------------------
 
@@ -209,7 +217,7 @@ class _Reader:
                 raise at.fault("BBT0604", f"'{clip(name)}' cannot name an export: give its file")
             # A format of several files goes into a folder of its own.
             file = f"{self.output}/{tree}{part}{exporter.suffix or f'-{form}'}"
-        self._claim(at, file, f"{tree}, {name}")
+        self.places.claim(at, file, f"{tree}, {name}", folder=not exporter.suffix)
         span = self.marked.span(at.path)
         return Export(name, form, file, options, not exporter.suffix, span)
 
@@ -223,12 +231,6 @@ class _Reader:
                 texts[name] = each.string()
         _diagnosed(at, lambda: parse_options(exporter, texts))
         return tuple(sorted(texts.items()))
-
-    def _claim(self, at: At, file: str, owner: str) -> None:
-        """Every file is made once."""
-        other = self.owners.setdefault(file, owner)
-        if other != owner:
-            self.faults.add(at.fault("BBT1003", f"{file} is made twice: for '{other}' and for '{owner}'"))
 
 
 # --- single values ---------------------------------------------------------------------------
@@ -268,7 +270,7 @@ def _target(at: At) -> Fraction:
     try:
         return parse_probability(at.string())
     except ValueError as error:
-        raise at.fault("BBT0604", legible(str(error))) from None
+        raise at.fault("BBT0604", printable(str(error))) from None
 
 
 def _path(at: At) -> str:

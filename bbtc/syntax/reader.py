@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 
 from bbtc.diagnostics import BbtcError
+from bbtc.files import read_file, reason
 from bbtc.source import SourceFile, Span
 
 MAX_BYTES = 64 * 1024 * 1024
@@ -28,11 +28,10 @@ def read_source(path: str, max_bytes: int = MAX_BYTES) -> SourceFile:
         if path == "-":
             data = sys.stdin.buffer.read(max_bytes + 1)
         else:
-            # Never more than the limit, whatever the size claims: this may be a pipe or a device.
-            with Path(path).open("rb") as file:
-                data = file.read(max_bytes + 1)
+            # Never more than the limit, whatever the size claims.
+            data = read_file(path, max_bytes + 1, descriptors=True)
     except (OSError, ValueError) as error:
-        raise BbtcError.single("BBT0001", f"cannot read {name}: {_reason(error)}") from error
+        raise BbtcError.single("BBT0001", f"cannot read {name}: {reason(error)}") from error
     if len(data) > max_bytes:
         raise BbtcError.single("BBT0005", f"{name} is larger than {max_bytes // 2**20} MiB")
     return decode_source(name, data)
@@ -63,11 +62,3 @@ def decode_source(name: str, data: bytes) -> SourceFile:
 
 def _lines(text: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _reason(error: OSError | ValueError) -> str:
-    if isinstance(error, IsADirectoryError):
-        return "it is a directory"
-    if isinstance(error, FileNotFoundError):
-        return "there is no such file"
-    return getattr(error, "strerror", None) or str(error)

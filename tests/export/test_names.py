@@ -15,8 +15,8 @@ from bbtc.export.names import (
     identifiers,
     parameter_names,
     port_values,
-    printable,
 )
+from bbtc.printable import printable
 from tests.strategies import HOSTILE_NAMES
 
 KINDS: list[Literal["predicate", "action"]] = ["predicate", "action"]

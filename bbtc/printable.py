@@ -1,0 +1,16 @@
+"""Texts of strangers (names, labels, paths) as what may be shown: on one line, steering no terminal."""
+
+from __future__ import annotations
+
+
+def printable(text: str) -> str:
+    """The text on one line, with a replacement character for whatever does not print (among it
+    all that XML 1.0 cannot hold)."""
+    return "".join(
+        c if c.isprintable() and c not in "\ufffe\uffff" else "\N{REPLACEMENT CHARACTER}" for c in text
+    )
+
+
+def printable_line(text: str) -> str:
+    """The same, but tabs stay: for a line of a file."""
+    return "\t".join(map(printable, text.split("\t")))
