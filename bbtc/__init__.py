@@ -9,11 +9,13 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from types import MappingProxyType, ModuleType
-from typing import TYPE_CHECKING, Any
 
 from bbtc.version import __version__
 
+TYPE_CHECKING = False  # to checkers it is true; the module `typing` takes its time to load
 if TYPE_CHECKING:
+    from typing import Any
+
     from bbtc.api import (
         bounds,
         build,

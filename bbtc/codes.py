@@ -104,7 +104,7 @@ CODES: dict[str, str] = {
     # 07xx: exports
     "BBT0701": "unknown export format",
     "BBT0702": "two exporters claim one format",
-    "BBT0703": "exporter cannot be loaded",
+    "BBT0703": "exporter that does not load, or fails",
     "BBT0704": "wrong export option",
     "BBT0705": "tree too deep for the engine",
     "BBT0706": "no program can draw the picture",

@@ -63,6 +63,16 @@ def reason(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
+_TROUBLE = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG, errno.EROFS))
+
+
+def system_trouble(error: BaseException) -> str | None:
+    """Why the system could not write, where that is what an exception is about: nobody's bug."""
+    if isinstance(error, OSError) and error.errno in _TROUBLE:
+        return f"{error.strerror}: {error.filename}" if error.filename else error.strerror
+    return None
+
+
 # --- where to write --------------------------------------------------------------------------
 
 

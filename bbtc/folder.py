@@ -120,6 +120,21 @@ class Folder:
         opened = os.open(path, os.O_RDONLY | _DIRECTORY | _NO_FOLLOW | _COMMON, dir_fd=relative)
         return Folder(self.shown(name), opened)
 
+    def require_place(self, parts: tuple[str, ...], *, for_folder: bool = False) -> None:
+        """Raise ``OSError`` now where it is plain that no file (``for_folder``: no folder) can be made at a
+        path below: where something else stands there, or a link on the way."""
+        with contextlib.ExitStack() as stack:
+            folder = self
+            for number, part in enumerate(parts, 1):
+                folder._refuse_link(part)
+                found = folder.status(part)
+                if found is None:
+                    return
+                if number == len(parts) and not for_folder:
+                    _require_file(found, folder.shown(part))
+                else:
+                    folder = stack.enter_context(folder.sub(part))
+
     def _refuse_link(self, name: str) -> None:
         found = self.status(name)
         if found is not None and _is_link(found):
@@ -171,6 +186,15 @@ class Folder:
             path, relative = self.where(name)
             with contextlib.suppress(FileExistsError):
                 return name, os.open(path, flags, 0o666, dir_fd=relative)
+
+
+def _require_file(found: os.stat_result, shown: str) -> None:
+    if _is_link(found):
+        raise OSError(errno.ELOOP, LINK, shown)
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a directory", shown)
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "it is not a regular file", shown)
 
 
 def _is_link(found: os.stat_result) -> bool:
@@ -242,12 +266,7 @@ class Batch:
         mode = None
         if found is not None:
             mode = stat.S_IMODE(found.st_mode) & 0o777
-            if _is_link(found):
-                raise OSError(errno.ELOOP, LINK, folder.shown(name))
-            if stat.S_ISDIR(found.st_mode):
-                raise IsADirectoryError(errno.EISDIR, "it is a directory")
-            if not stat.S_ISREG(found.st_mode):
-                raise OSError(errno.EINVAL, "it is not a regular file")
+            _require_file(found, folder.shown(name))
             path, relative = folder.where(name)
             if not os.access(path, os.W_OK, dir_fd=relative):
                 raise PermissionError(errno.EACCES, "permission denied")

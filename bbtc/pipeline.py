@@ -322,7 +322,7 @@ def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limit
     """The tree in an export format, the same whether it was just planned or read from a file. Raises
     :class:`BbtcError` for an unknown format or option and for a tree the format cannot hold."""
     from bbtc.artefacts.tree_json import carried
-    from bbtc.export.registry import load_exporter, parse_options
+    from bbtc.export.registry import load_exporter, parse_options, run_exporter
 
     tree = carried(tree)
     exporter = load_exporter(form)
@@ -333,4 +333,4 @@ def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limit
         from bbtc.belief.simulate import flow
 
         reached = flow(tree.task, tree.root, explore(tree.task, tree.root, limits))
-    return exporter.export(tree, parsed, reached)
+    return run_exporter(exporter, form, tree, parsed, reached)

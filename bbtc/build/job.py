@@ -11,6 +11,7 @@ from bbtc.artefacts import dumps, load_tree, tree_to_json
 from bbtc.artefacts.numbers import exact
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.export.registry import Files
+from bbtc.files import system_trouble
 from bbtc.limits import Limits
 from bbtc.manifest.read import Export, TreeEntry
 from bbtc.plan.options import Options
@@ -67,6 +68,10 @@ def perform(job: Job) -> Made:
         failure: Failure = "limit" if isinstance(error, LimitReached) else "error"
         return Made(job.entry.name, diagnostics=tuple(found), failure=failure)
     except Exception as error:  # noqa: BLE001 - a bug met in one tree must not lose the others
+        trouble = system_trouble(error)
+        if trouble is not None:
+            found = [*report, Diagnostic("BBT0004", f"cannot write a temporary file: {trouble}")]
+            return Made(job.entry.name, diagnostics=tuple(found), failure="error")
         return broken(job.entry.name, f"{type(error).__name__}: {error}")
 
 

@@ -207,9 +207,12 @@ class _Builder:
         return plan.keys() - fresh.keys()
 
     def _job(self, entry: TreeEntry, stale: set[str]) -> Job:
-        """What has to be done for a tree. Raises :class:`BbtcError` for an input that cannot be read."""
+        """What has to be done for a tree. Raises :class:`BbtcError` for an input that cannot be read, and for
+        a place that cannot be written to."""
         from bbtc.build.job import FIGURES, TREE, Job, export_step
 
+        if self.held is not None:
+            _require_places(self.held, entry)
         tree = None
         if TREE not in stale:
             with contextlib.suppress(OSError):
@@ -301,6 +304,15 @@ def require_apart(manifest: Manifest) -> None:
                     )
     if found:
         raise BbtcError(found)
+
+
+def _require_places(held: Held, entry: TreeEntry) -> None:
+    places = [(entry.file, False, entry.span), *((e.file, e.many, e.span) for e in entry.exports)]
+    for file, many, span in places:
+        try:
+            held.project.require_place(relative_parts(file), for_folder=many)
+        except OSError as error:
+            raise cannot_build(source_name(held.path, file), error, span) from error
 
 
 def sources_of(manifest: Path) -> list[Path]:

@@ -21,9 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from bbtc.diagnostics import BbtcError
-from bbtc.files import cannot_write, read_file, reason
+from bbtc.files import read_file, reason
 from bbtc.folder import LINK, Batch, Folder, leftovers
 from bbtc.limits import Limits
+from bbtc.manifest.find import source_name
+from bbtc.source import Span
 from bbtc.version import __version__
 
 FOLDER = ".bbtc"
@@ -225,13 +227,14 @@ def sole_builder(folder: Path) -> Iterator[Held]:
     Raises :class:`BbtcError` if the folder cannot be written, or a link is in the way."""
     with contextlib.ExitStack() as stack:
         try:
-            project = stack.enter_context(Folder(str(folder)))
+            shown = source_name(folder, "")
+            project = stack.enter_context(Folder("" if shown == "." else shown))
             own = stack.enter_context(project.sub(FOLDER, make=True))
             scratch = stack.enter_context(own.sub("scratch", make=True))
             _ignore_itself(own, scratch)
             lock = own.open(_LOCK, os.O_RDWR | os.O_CREAT)
         except OSError as error:
-            raise cannot_build(str(folder / FOLDER), error) from error
+            raise cannot_build(source_name(folder, FOLDER), error) from error
         stack.callback(os.close, lock)
         try:
             import fcntl
@@ -253,10 +256,10 @@ def _ignore_itself(own: Folder, scratch: Folder) -> None:
             batch.commit()
 
 
-def cannot_build(path: str, error: OSError) -> BbtcError:
+def cannot_build(path: str, error: OSError, span: Span | None = None) -> BbtcError:
     """The error for a file or folder of a project that cannot be written to."""
     if error.strerror != LINK:
-        return cannot_write(path, reason(error))
+        return BbtcError.single("BBT0004", f"cannot write {path}: {reason(error)}", span)
     hint = "a build writes through no link: put a file or folder in its place, or name another one"
-    at = f": {error.filename}" if error.filename else ""
-    return BbtcError.single("BBT1008", f"cannot write {path}: {LINK}{at}", hint=hint)
+    at = f": {error.filename}" if error.filename and error.filename != path else ""
+    return BbtcError.single("BBT1008", f"cannot write {path}: {LINK}{at}", span, hint)

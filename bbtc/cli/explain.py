@@ -7,6 +7,7 @@ import re
 
 import click
 
+from bbtc.cli.output import show
 from bbtc.cli.session import Session
 from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
@@ -37,6 +38,6 @@ def command(session: Session, code: str | None) -> None:  # noqa: ARG001
     """Explain what CODE (such as BBT0202) means, why it is reported, and how to mend it. Without
     CODE, list all codes."""
     if code is None:
-        click.echo("".join(f"{each}  {title}\n" for each, title in CODES.items()), nl=False)
+        show("".join(f"{each}  {title}\n" for each, title in CODES.items()), nl=False)
     else:
-        click.echo(page(_code(code)), nl=False)
+        show(page(_code(code)), nl=False)

@@ -8,6 +8,7 @@ from fractions import Fraction
 
 import click
 
+from bbtc.cli.output import on_terminal
 from bbtc.cli.session import (
     Probability,
     Session,
@@ -111,7 +112,7 @@ def require_place(
     parse_options(exporter, options)
     if output == "-" and not exporter.suffix:
         raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
-    if output == "-" and form == "png" and sys.stdout.isatty():
+    if output == "-" and form == "png" and on_terminal(sys.stdout):
         raise click.UsageError("The format 'png' is no text: name a file with -o.")
     session.expect_output(output, inputs, folder=not exporter.suffix, check=check, depfile=depfile)
 

@@ -1,36 +1,15 @@
-"""The command ``bbtc``: subcommands loaded when used, and exit statuses.
+"""The program ``bbtc``: from its first moment to its exit status, whatever happens to it.
 
-Exit statuses: 0 done; 1 errors in the input, drift, or a target provably out of reach; 2 wrong
-usage; 3 a limit stopped the work; 70 internal error; 130 interrupted.
+Exit statuses: 0 done; 1 errors in the input, drift, a target provably out of reach, or a result that cannot
+be written; 2 wrong usage; 3 a limit stopped the work; 70 internal error; 130 interrupted.
+
+This module imports nothing that takes time: until :func:`main` runs, Ctrl-C shows a traceback.
 """
 
 from __future__ import annotations
 
-import gc
-import keyword
+import os
 import sys
-from importlib import import_module
-from pathlib import Path
-
-import click
-
-from bbtc.version import __version__
-
-COMMANDS = {
-    "fmt": "Give domains and problems their canonical layout.",
-    "check": "Report what is wrong or doubtful in domains and problems.",
-    "compile": "Parse, check and ground a problem into a task.",
-    "plan": "Plan a tree that reaches the goal with the wanted probability.",
-    "simulate": "Print the exact figures of a tree.",
-    "verify": "Recompute a tree's figures by other means, and compare.",
-    "run": "Watch a tree tick against the simulated world.",
-    "diff": "Tell what changed from one tree to another.",
-    "export": "Write a tree for people or for an execution engine.",
-    "import": "Read an exported tree back, with what was edited in it.",
-    "build": "Build every artefact of a project that is out of date.",
-    "init": "Make a small project to start from.",
-    "explain": "Explain what a code of a message means.",
-}
 
 EXIT_ERRORS = 1
 EXIT_USAGE = 2
@@ -38,123 +17,90 @@ EXIT_LIMIT = 3
 EXIT_INTERNAL = 70
 EXIT_INTERRUPTED = 130
 
-
-class LazyGroup(click.Group):
-    """A group whose commands are imported when they run, so that ``--help`` stays instant."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
-        """Every command, in the order of the pipeline."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """The command, imported now."""
-        if cmd_name not in COMMANDS:
-            return None
-        module = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
-        command = import_module(f"bbtc.cli.{module}").command
-        assert isinstance(command, click.Command)
-        return command
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command of the first argument; for one that there is not, what may be meant."""
-        try:
-            return super().resolve_command(ctx, args)
-        except click.UsageError as error:
-            from difflib import get_close_matches
-
-            near = get_close_matches(args[0], COMMANDS, n=1)
-            if near and args[0] not in COMMANDS:
-                raise click.UsageError(f"{error.message} Did you mean '{near[0]}'?", ctx) from error
-            raise
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """The commands with their one-line help, without importing any."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
-
-
-def _print_version(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
-    if value and not ctx.resilient_parsing:
-        click.echo(f"bbtc {__version__}")
-        ctx.exit()
-
-
-def _print_cmake_dir(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
-    if value and not ctx.resilient_parsing:
-        click.echo(Path(__file__).parents[1] / "cmake")
-        ctx.exit()
-
-
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
-@click.option(
-    "--version",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_print_version,
-    help="Print the version.",
-)
-@click.option(
-    "--cmake-dir",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_print_cmake_dir,
-    help="Print the folder of the CMake package: cmake -Dbbtc_DIR=$(bbtc --cmake-dir).",
-)
-@click.option("--debug", is_flag=True, help="Show a traceback for an internal error.")
-@click.option(
-    "--format",
-    "diagnostic_format",
-    type=click.Choice(["text", "json", "sarif", "github"]),
-    default="text",
-    show_default=True,
-    help="How diagnostics are written to stderr (every command takes it, too).",
-)
-@click.pass_context
-def cli(ctx: click.Context, debug: bool, diagnostic_format: str) -> None:
-    """Turn what a robot can do, see and fail at into a behavior tree with a proven probability
-    of success.
-
-    DOMAIN and PROBLEM are files in the bbtc language, a superset of PPDDL; one file may hold both,
-    and `-` is the standard input.
-    """
-    ctx.obj = {"format": diagnostic_format}
-    del debug  # read by main(), which must know it before anything can fail
+_INTERRUPTED = "interrupted"
 
 
 def main() -> None:
     """Entry point of the program ``bbtc``."""
-    debug = "--debug" in sys.argv
     try:
-        status = cli.main(standalone_mode=False)
-        sys.exit(status if isinstance(status, int) else 0)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted", err=True)
-        sys.exit(EXIT_INTERRUPTED)
-    except BrokenPipeError:
-        # The reader of our output has gone (`bbtc … | head`): not an error worth a message.
-        sys.stderr.close()
-        sys.exit(EXIT_ERRORS)
-    except Exception as error:
-        if debug:
-            raise
-        name = type(error).__name__
-        click.echo(
-            f"internal error: {name}: {error}\n"
-            "This is a bug in bbtc, not in your input. Please report it with the input and the output of "
-            "the same command with `bbtc --debug`.",
-            err=True,
-        )
-        sys.exit(EXIT_INTERNAL)
-    finally:
-        # A task may hold millions of objects, among which the interpreter need not look for cycles now.
-        gc.freeze()
+        _take_over_signals()
+        _take_over_streams()
+        from bbtc.cli.outcome import run
+
+        status = run()
+    except KeyboardInterrupt:
+        status = EXIT_INTERRUPTED
+        _say(_INTERRUPTED)
+    _end(status)
+
+
+def _take_over_signals() -> None:
+    import signal
+
+    # Where it is something else, whoever started us wants it so.
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave)
+        sys.unraisablehook = _unraisable
+
+
+def _leave(_number: int, _frame: object) -> None:
+    """Ctrl-C while the program loads: there is nothing to clean up."""
+    _say(_INTERRUPTED)
+    os._exit(EXIT_INTERRUPTED)
+
+
+def _unraisable(what: sys.UnraisableHookArgs) -> None:
+    """Where an exception cannot be raised (in a destructor), Ctrl-C is not lost: it comes again."""
+    if what.exc_type is KeyboardInterrupt:
+        import _thread
+        import threading
+
+        threading.Timer(0.01, _thread.interrupt_main).start()
+    else:
+        sys.__unraisablehook__(what)
+
+
+def _take_over_streams() -> None:
+    """No file that is opened may get the number of a standard stream that is closed: it would get its text,
+    too. No letter may be too much for a terminal."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _say(text: str) -> None:
+    """A line on stderr, if anybody can hear it."""
+    import contextlib
+
+    with contextlib.suppress(OSError):
+        os.write(2, f"{text}\n".encode())
+
+
+def _end(status: int) -> None:
+    """Exit; what was printed is either out, or told to be lost."""
+    import gc
+    import signal
+
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done; nothing is left to interrupt
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError as error:
+            if stream is sys.stdout and not isinstance(error, BrokenPipeError):
+                _say(f"error[BBT0004]: cannot write the standard output: {error.strerror}")
+            if stream is sys.stdout and status == 0:
+                status = EXIT_ERRORS
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # the interpreter flushes it again
+    # A task may hold millions of objects, among which the interpreter need not look for cycles now.
+    gc.freeze()
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -1,15 +1,39 @@
-"""The line that shows progress on stderr."""
+"""What goes to stderr: messages, and the line that shows progress."""
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import sys
 import time
 from dataclasses import dataclass, field
+from typing import TextIO
 
 import click
 
+from bbtc.files import cannot_write
 from bbtc.limits import Stage
+from bbtc.printable import printable
+
+
+def tell(text: str, *, nl: bool = True, color: bool | None = None) -> None:
+    """Write to stderr. If nobody can hear it (it is closed, or its device is full), the work goes on, and its
+    exit status tells how it went."""
+    with contextlib.suppress(OSError):
+        click.echo(text, err=True, nl=nl, color=color)
+
+
+def show(text: str = "", *, nl: bool = True, color: bool | None = None) -> None:
+    """Write to stdout. Raises :class:`BbtcError` where it is closed, and ``OSError``."""
+    if sys.stdout is None:
+        raise cannot_write("the standard output", "it is closed")
+    click.echo(text, nl=nl, color=color)
+
+
+def on_terminal(stream: TextIO | None) -> bool:
+    """Is a standard stream, which may be closed, a terminal?"""
+    return stream is not None and stream.isatty()
+
 
 _QUIET = 1.0  # seconds until something is shown at all
 _PAUSE = 0.1  # seconds between two looks
@@ -28,7 +52,7 @@ class ProgressLine:
     @classmethod
     def on_terminal(cls) -> ProgressLine | None:
         """The line, or None if stderr is no terminal."""
-        return cls() if sys.stderr.isatty() else None
+        return cls() if on_terminal(sys.stderr) else None
 
     def watch(self, stage: Stage) -> None:
         """Show what is being done, if it takes long and some time has passed since."""
@@ -48,12 +72,12 @@ class ProgressLine:
 
     def show(self, text: str) -> None:
         """Put a text in the place of what is shown."""
-        text = text[: shutil.get_terminal_size().columns - 1]
-        click.echo(f"\r{text:{self.width}}", err=True, nl=False)
+        text = printable(text)[: shutil.get_terminal_size().columns - 1]
+        tell(f"\r{text:{self.width}}", nl=False)
         self.width = len(text)
 
     def erase(self) -> None:
         """Leave the line empty."""
         if self.width:
-            click.echo(f"\r{'':{self.width}}\r", err=True, nl=False)
+            tell(f"\r{'':{self.width}}\r", nl=False)
             self.width = 0

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bbtc.cli.output import on_terminal, show
 from bbtc.cli.session import Session, limit_options
 from bbtc.cli.session import command as session_command
 
@@ -67,19 +68,19 @@ def command(
     stepper = Stepper(loaded.task, loaded.root, seed, session.limits)
     taken = _Taken(outcomes)
     stepper.start(taken.next(stepper.starts) if len(stepper.starts) > 1 else None)
-    if not batch and sys.stdin.isatty() and sys.stdout.isatty():
+    if not batch and on_terminal(sys.stdin) and on_terminal(sys.stdout):
         while not stepper.finished and (choice := taken.next(stepper.now.branches)) is not None:
             stepper.step(choice)
         _interact(loaded, stepper, full)
         return 0
-    color = sys.stdout.isatty() and "NO_COLOR" not in os.environ
+    color = on_terminal(sys.stdout) and "NO_COLOR" not in os.environ
     for line in _frame(loaded, stepper, full):
-        click.echo(line, color=color)
+        show(line, color=color)
     while not stepper.finished and len(stepper.moments) <= steps:
         stepper.step(taken.next(stepper.now.branches))
-        click.echo()
+        show()
         for line in _frame(loaded, stepper, full):
-            click.echo(line, color=color)
+            show(line, color=color)
     return 0
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, cast
 import click
 
 from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
-from bbtc.cli.output import ProgressLine
+from bbtc.cli.output import ProgressLine, on_terminal, tell
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.files import Outputs, require_apart, require_writable
@@ -51,7 +51,7 @@ class Session:
         in it may come from strangers: what would steer a terminal is replaced."""
         if self.form == "text":
             self.clear()
-            click.echo(printable(text), err=True)
+            tell(printable(text))
 
     def read(self, path: str) -> SourceFile:
         """A source file, ``-`` for stdin; remembered for ``--depfile``."""
@@ -98,11 +98,11 @@ class Session:
 
     def show(self, diagnostics: Sequence[Diagnostic]) -> None:
         """Write diagnostics to stderr in the session's form (the machine forms even if empty)."""
-        color = self.form == "text" and sys.stderr.isatty() and "NO_COLOR" not in os.environ
+        color = self.form == "text" and on_terminal(sys.stderr) and "NO_COLOR" not in os.environ
         text = render(diagnostics, self.form, color=color)
         if text:
             self.clear()
-            click.echo(text, err=True, nl=False, color=color)
+            tell(text, nl=False, color=color)
 
 
 def _rule(output: str, inputs: Sequence[str]) -> bytes:

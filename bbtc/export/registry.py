@@ -17,6 +17,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 from bbtc.diagnostics import BbtcError
+from bbtc.files import relative_parts
 from bbtc.tree.nodes import Tree
 
 if TYPE_CHECKING:
@@ -127,6 +128,52 @@ def load_exporter(name: str) -> Exporter:
             "BBT0703", f"the plugin for the format '{name}' is not an exporter: {owners[0]}"
         )
     return exporter
+
+
+def run_exporter(
+    exporter: Exporter,
+    form: str,
+    tree: Tree,
+    options: Mapping[str, OptionValue],
+    figures: Figures | None,
+) -> Artefact:
+    """What an exporter makes. Raises :class:`BbtcError` where it refuses the tree, and where one of another
+    package fails, or makes what cannot be written."""
+    if form in BUILT_INS:
+        return exporter.export(tree, options, figures)
+    try:
+        artefact: object = exporter.export(tree, options, figures)
+        return _written(artefact)
+    except BbtcError:
+        raise
+    except Exception as error:  # whatever a stranger's exporter raises is its failure, not ours
+        raise _failed(form, f"{type(error).__name__}: {error}") from error
+
+
+def _written(artefact: object) -> Artefact:
+    """The artefact, if it can be written. Raises ``TypeError`` and ``ValueError``."""
+    match artefact:
+        case str():
+            artefact.encode()
+        case Files():
+            for name, text in artefact.texts.items():
+                relative_parts(name)
+                text.encode()
+        case bytes():
+            pass
+        case _:
+            raise TypeError(f"it made {type(artefact).__name__}, which is no artefact")
+    return artefact
+
+
+def _failed(form: str, why: str) -> BbtcError:
+    named = form
+    for point in _plugins():
+        if point.name == form:
+            package = f" of {point.dist.name} {point.dist.version}" if point.dist is not None else ""
+            named = f"{form} ({point.value}{package})"
+    hint = "this is a fault of the package that brings the exporter, not of bbtc: report it there"
+    return BbtcError.single("BBT0703", f"the exporter {named} failed: {why}", hint=hint)
 
 
 def parse_options(exporter: Exporter, texts: Mapping[str, str]) -> dict[str, OptionValue]:

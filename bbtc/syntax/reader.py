@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import sys
 
@@ -25,16 +26,22 @@ def read_source(path: str, max_bytes: int = MAX_BYTES) -> SourceFile:
     """
     name = "<stdin>" if path == "-" else path
     try:
+        # Never more than the limit, whatever the size claims.
         if path == "-":
-            data = sys.stdin.buffer.read(max_bytes + 1)
+            data = _standard_input(max_bytes + 1)
         else:
-            # Never more than the limit, whatever the size claims.
             data = read_file(path, max_bytes + 1, descriptors=True)
     except (OSError, ValueError) as error:
         raise BbtcError.single("BBT0001", f"cannot read {name}: {reason(error)}") from error
     if len(data) > max_bytes:
         raise BbtcError.single("BBT0005", f"{name} is larger than {max_bytes // 2**20} MiB")
     return decode_source(name, data)
+
+
+def _standard_input(most: int) -> bytes:
+    if sys.stdin is None:
+        raise OSError(errno.EBADF, "it is closed")
+    return sys.stdin.buffer.read(most)
 
 
 def decode_source(name: str, data: bytes) -> SourceFile:

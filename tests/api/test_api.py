@@ -211,7 +211,7 @@ def test_a_tree_draws_itself_in_a_notebook() -> None:
 
 
 def test_every_command_has_its_function() -> None:
-    from bbtc.cli.main import COMMANDS
+    from bbtc.cli.commands import COMMANDS
 
     other_names = {"fmt": "format_text", "import": "import_tree"}  # "import" is a word of the language
     assert len(COMMANDS) > 10

@@ -13,7 +13,7 @@ from typing import Any
 
 from click.testing import CliRunner
 
-from bbtc.cli.main import cli
+from bbtc.cli.commands import cli
 from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
