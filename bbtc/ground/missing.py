@@ -1,0 +1,395 @@
+"""What is missing at the root of a goal that nothing can make true: down from the goal, through what could
+set each fact and what that needs, to facts that nothing at all brings about.
+
+Who could set a fact are alternatives, what one of them needs stands together: an AND-OR graph, of which the
+cheapest repair is told (the fewest things to add). What the relaxed reachability of a model cannot reach,
+nothing can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.ground.normal import conjuncts, normal_form
+from bbtc.ground.program import all_groups
+from bbtc.ground.reach import Reach
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.model import formula as mf
+from bbtc.model.types import Parameter
+from bbtc.source import Span
+
+_MOST_FACTS = 2000
+"""So many impossible facts are followed at most; those beyond count as roots."""
+_MOST_MEMBERS = 20
+"""A quantifier over more objects is asked for any of them."""
+_COSTS = {"unknown": 2, "fact": 3, "object": 3, "together": 4}
+"""What it takes to put a root right: an action that nobody can take is explained last."""
+_GIVEN = 1000.0
+"""What it takes to give a fact at the start that actions could bring about: told only where each of them
+needs that very fact, somewhere on its way."""
+
+_Env: TypeAlias = Mapping[str, int]
+_Row: TypeAlias = tuple[int | None, ...]
+_NEVER = float("inf")
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """An atom that would have to have the value; an argument None stands for any object."""
+
+    predicate: str
+    row: _Row
+    value: Truth
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class NoObject:
+    """An object of one of these types: there is none."""
+
+    types: tuple[str, ...]
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class NoneTogether:
+    """Objects that meet all that the action (or rule) asks at once: each part alone can be met."""
+
+    name: str
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+Root: TypeAlias = Fact | NoObject | NoneTogether
+
+
+@dataclass(frozen=True, slots=True)
+class _Every:
+    parts: tuple[_Need, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Some:
+    parts: tuple[_Need, ...]
+
+
+_Need: TypeAlias = Root | _Every | _Some
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """Something that would give a fact its value, were it not for what it needs."""
+
+    by: str
+    need: _Need
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """What is missing, and the action that needs it (None: the goal itself). ``setters`` could bring it
+    about, but need it themselves."""
+
+    what: Root
+    by: str | None
+    setters: tuple[str, ...] = ()
+
+
+class Search:
+    """Looks for what is missing in one model."""
+
+    def __init__(self, reach: Reach, limits: Limits) -> None:
+        self.reach = reach
+        self.universe = reach.universe
+        self._limits = limits
+        model = reach.usage.model
+        self._setters: dict[tuple[str, Truth], list[_Setter]] = {}
+        for schema in model.schemas.values():
+            needs = tuple(conjuncts(normal_form(schema.precondition)))
+            for group in all_groups(reach.usage.blocks[schema.name]):
+                for leaf in group.sets:
+                    setter = _Setter(
+                        schema.name,
+                        schema.span,
+                        schema.parameters + group.parameters,
+                        leaf.args,
+                        needs + group.guard,
+                    )
+                    self._setters.setdefault((leaf.predicate, leaf.value), []).append(setter)
+        for rule in model.rules:
+            needs = tuple(conjuncts(normal_form(rule.condition)))
+            setter = _Setter(rule.predicate, rule.span, rule.parameters, rule.args, needs)
+            self._setters.setdefault((rule.predicate, Truth.TRUE), []).append(setter)
+            unknown = mf.Or(tuple(mf.Test("unknown", atom) for atom in mf.atoms(rule.condition)))
+            setter = _Setter(rule.predicate, rule.span, rule.parameters, rule.args, (unknown,))
+            self._setters.setdefault((rule.predicate, Truth.UNKNOWN), []).append(setter)
+        self._possible: dict[Fact, bool] = {}
+        self._ways: dict[Fact, list[_Way]] = {}
+        self._costs: dict[Fact, float] = {}
+
+    def missing(self, part: mf.Formula) -> tuple[Missing, ...]:
+        """What a part of the goal that nothing can make true lacks, nearest to the goal first; empty where
+        that cannot be told."""
+        need = self._need(normal_form(part), {})
+        if need is None:
+            return ()
+        self._explore(need)
+        self._spread()
+        return tuple(self._roots(need))
+
+    # --- what a condition lacks ----------------------------------------------------------------
+
+    def _need(self, formula: mf.Formula, env: _Env) -> _Need | None:
+        """What a condition in normal form lacks; None if nothing. Parameters that ``env`` does not bind
+        stand for any object."""
+        match formula:
+            case mf.Atom(predicate, args, span):
+                return self._lacking(Fact(predicate, self._row(args, env), Truth.TRUE, span))
+            case mf.Not(mf.Atom(predicate, args, span)):
+                return self._lacking(Fact(predicate, self._row(args, env), Truth.FALSE, span))
+            case mf.Test(kind, atom, span):
+                values = (Truth.UNKNOWN,) if kind == "unknown" else (Truth.TRUE, Truth.FALSE)
+                row = self._row(atom.args, env)
+                return _some(self._lacking(Fact(atom.predicate, row, value, span)) for value in values)
+            case mf.Equal(left, right):
+                return None if self._may_equal(left, right, env, same=True) else _Some(())
+            case mf.Not(mf.Equal(left, right)):
+                return None if self._may_equal(left, right, env, same=False) else _Some(())
+            case mf.And(parts):
+                return _every(self._need(part, env) for part in parts)
+            case mf.Or(parts):
+                return _some(self._need(part, env) for part in parts)
+            case mf.Quantified(kind, (parameter,), inner):
+                return self._quantified(kind, parameter, inner, env)
+            case mf.Not() | mf.Quantified():
+                raise AssertionError("not in normal form")
+            case _:
+                assert_never(formula)
+
+    def _quantified(self, kind: str, parameter: Parameter, inner: mf.Formula, env: _Env) -> _Need | None:
+        members = self.universe.members(parameter.types)
+        if not members:
+            return NoObject(parameter.types, parameter.span) if kind == "exists" else None
+        self._limits.check_time("grounding")
+        free = {name: number for name, number in env.items() if name != parameter.name}
+        if len(members) > _MOST_MEMBERS:
+            return self._need(inner, free)
+        each = (self._need(inner, {**free, parameter.name: member}) for member in members)
+        return _some(each) if kind == "exists" else _every(each)
+
+    def _lacking(self, fact: Fact) -> Fact | None:
+        if fact not in self._possible:
+            self._possible[fact] = self._can_be(fact)
+        return None if self._possible[fact] else fact
+
+    def _can_be(self, fact: Fact) -> bool:
+        if None not in fact.row:
+            row = tuple(number for number in fact.row if number is not None)
+            return self._true_or_other(fact, row)
+        if fact.value is Truth.FALSE:
+            return True  # of any object: few facts hold of all of them
+        rows = self.reach.values[fact.value][fact.predicate]
+        return any(
+            all(wanted in (None, number) for wanted, number in zip(fact.row, row, strict=True))
+            for row in rows
+        )
+
+    def _true_or_other(self, fact: Fact, row: tuple[int, ...]) -> bool:
+        if fact.value is Truth.FALSE and fact.predicate in self.reach.usage.derived:
+            return True  # whether a derived atom can be false is not traced
+        return self.reach.can_be(fact.value, fact.predicate, row)
+
+    def _row(self, args: Iterable[mf.Term], env: _Env) -> _Row:
+        return tuple(env.get(arg) if mf.is_parameter(arg) else self.universe.index[arg] for arg in args)
+
+    def _may_equal(self, left: mf.Term, right: mf.Term, env: _Env, *, same: bool) -> bool:
+        one, other = self._row((left, right), env)
+        if left == right:
+            return same
+        return one is None or other is None or (one == other) is same
+
+    # --- who could bring it about --------------------------------------------------------------
+
+    def _explore(self, need: _Need) -> None:
+        """The ways to every fact that the need leads to."""
+        todo = list(_facts(need))
+        for fact in todo:  # grows while it is read: breadth first
+            if fact in self._ways:
+                continue
+            self._limits.check_time("grounding")
+            few = len(self._ways) < _MOST_FACTS
+            self._ways[fact] = list(self._ways_to(fact)) if few else []
+            for way in self._ways[fact]:
+                todo.extend(_facts(way.need))
+
+    def _ways_to(self, fact: Fact) -> Iterator[_Way]:
+        derived = fact.predicate in self.reach.usage.derived
+        if fact.value is Truth.UNKNOWN and not derived:
+            return  # what is not known is, nearly always, for `:init` to say
+        for setter in self._setters.get((fact.predicate, fact.value), ()):
+            unified = self._unified(setter, fact.row)
+            for env in [] if unified is None else self._narrowed(setter, unified):
+                yield self._way(setter, env)
+
+    def _way(self, setter: _Setter, env: _Env) -> _Way:
+        needs: list[_Need | None] = [
+            NoObject(parameter.types, parameter.span)
+            for parameter in setter.parameters
+            if parameter.name not in env and not self.universe.members(parameter.types)
+        ]
+        needs.extend(self._need(part, env) for part in setter.needs)
+        return _Way(setter.by, _every(needs) or NoneTogether(setter.by, setter.span))
+
+    def _narrowed(self, setter: _Setter, env: dict[str, int]) -> list[dict[str, int]]:
+        """The ways to bind more parameters by what never changes, as long as they are few: a map tells where
+        one may come from."""
+        envs = [env]
+        for part in setter.needs:
+            if not isinstance(part, mf.Atom) or part.predicate in self.reach.usage.derived:
+                continue
+            if not self.reach.usage.is_static(part.predicate):
+                continue
+            rows = self.reach.values[Truth.TRUE][part.predicate]
+            found = [more for each in envs for more in self._joined(setter, part.args, each, rows)]
+            if 0 < len(found) <= _MOST_MEMBERS:
+                envs = found
+        return envs
+
+    def _joined(
+        self, setter: _Setter, args: tuple[mf.Term, ...], env: dict[str, int], rows: Iterable[tuple[int, ...]]
+    ) -> list[dict[str, int]]:
+        """The bindings that a relation adds, in order of its objects; only the first few if they are many."""
+        wanted = self._row(args, env)
+        fitting = [
+            row for row in rows if all(w in (None, number) for w, number in zip(wanted, row, strict=True))
+        ]
+        if len(fitting) > _MOST_MEMBERS:
+            return [env] * len(fitting)
+        types = {parameter.name: parameter.types for parameter in setter.parameters}
+        found = []
+        for row in sorted(fitting):
+            more = dict(env)
+            if all(
+                not mf.is_parameter(arg)
+                or (more.setdefault(arg, number) == number and number in self.universe.members(types[arg]))
+                for arg, number in zip(args, row, strict=True)
+            ):
+                found.append(more)
+        return found
+
+    def _unified(self, setter: _Setter, row: _Row) -> dict[str, int] | None:
+        """The parameters of a setter that sets just this atom; None if it never does."""
+        types = {parameter.name: parameter.types for parameter in setter.parameters}
+        env: dict[str, int] = {}
+        for arg, number in zip(setter.args, row, strict=True):
+            if number is None:
+                continue
+            if not mf.is_parameter(arg):
+                if self.universe.index[arg] != number:
+                    return None
+            elif env.setdefault(arg, number) != number or number not in self.universe.members(types[arg]):
+                return None
+        return env
+
+    # --- the cheapest repair -------------------------------------------------------------------
+
+    def _spread(self) -> None:
+        """The cost of each fact, the least that fits all ways: later facts first, until nothing changes."""
+        order = [*reversed(self._ways)]
+        self._costs = {fact: _GIVEN if self._ways[fact] else float(_COSTS[_kind(fact)]) for fact in order}
+        changed = True
+        while changed:
+            self._limits.check_time("grounding")
+            changed = False
+            for fact in order:
+                least = min((self._cost(way.need) for way in self._ways[fact]), default=_NEVER)
+                if least < self._costs[fact]:
+                    self._costs[fact] = least
+                    changed = True
+
+    def _cost(self, need: _Need) -> float:
+        match need:
+            case Fact():
+                return self._costs[need]
+            case NoObject() | NoneTogether():
+                return float(_COSTS[_kind(need)])
+            case _Every(parts):
+                return sum(map(self._cost, parts), 0.0)
+            case _Some(parts):
+                return min(map(self._cost, parts), default=_NEVER)
+            case _:
+                assert_never(need)
+
+    def _roots(self, need: _Need) -> Iterator[Missing]:
+        """The roots of the cheapest repair, nearest first."""
+        seen: set[Root] = set()
+        todo: list[tuple[_Need, str | None]] = [(need, None)]
+        for each, by in todo:  # grows while it is read: breadth first
+            match each:
+                case _Every(parts):
+                    todo.extend((part, by) for part in parts)
+                case _Some(parts):
+                    todo.extend((part, by) for part in sorted(parts, key=self._cost)[:1])
+                case Fact() | NoObject() | NoneTogether():
+                    if each in seen:
+                        continue
+                    seen.add(each)
+                    ways = self._ways[each] if isinstance(each, Fact) else []
+                    fresh = [way for way in ways if seen.isdisjoint(_facts(way.need))]
+                    best = min(fresh, key=lambda way: self._cost(way.need), default=None)
+                    if best is None or self._cost(best.need) > self._cost(each):
+                        yield Missing(each, by, tuple(dict.fromkeys(way.by for way in ways)))
+                    else:
+                        todo.append((best.need, best.by))
+                case _:
+                    assert_never(each)
+
+
+@dataclass(frozen=True, slots=True)
+class _Setter:
+    """What gives an atom a value: an action's effect, or a rule."""
+
+    by: str
+    span: Span | None
+    parameters: tuple[Parameter, ...]
+    args: tuple[mf.Term, ...]
+    needs: tuple[mf.Formula, ...]
+
+
+def _every(needs: Iterable[_Need | None]) -> _Need | None:
+    found = [need for need in needs if need is not None]
+    return None if not found else found[0] if len(found) == 1 else _Every(tuple(found))
+
+
+def _some(needs: Iterable[_Need | None]) -> _Need | None:
+    """One of them is enough: nothing is lacking if one lacks nothing."""
+    found: list[_Need] = []
+    for need in needs:
+        if need is None:
+            return None
+        found.append(need)
+    return found[0] if len(found) == 1 else _Some(tuple(found))
+
+
+def _facts(need: _Need) -> Iterator[Fact]:
+    todo = [need]
+    for each in todo:
+        if isinstance(each, Fact):
+            yield each
+        elif isinstance(each, (_Every, _Some)):
+            todo.extend(each.parts)
+
+
+def _kind(root: Root) -> str:
+    match root:
+        case Fact():
+            return "unknown" if root.value is Truth.UNKNOWN else "fact"
+        case NoObject():
+            return "object"
+        case NoneTogether():
+            return "together"
+        case _:
+            assert_never(root)
