@@ -1,5 +1,5 @@
-"""Doubts about the start and the goal of a problem that need no grounding: what `:init` leaves
-false although the goal needs it found out, most likely a forgotten `(unknown …)`; goals that no predicate allows."""
+"""Doubts about the start and the goal of a problem that need no grounding: what `:init` leaves false
+although the goal needs it found out, most likely a forgotten `(unknown …)`; goals no predicate allows."""
 
 from __future__ import annotations
 

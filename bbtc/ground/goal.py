@@ -9,7 +9,7 @@ from typing_extensions import assert_never
 from bbtc.diagnostics import Diagnostic, Related, Report, Severity
 from bbtc.ground.atoms import Atoms
 from bbtc.ground.lower import Lowering
-from bbtc.ground.missing import Fact, Missing, NoneTogether, NoObject, Root, Search
+from bbtc.ground.missing import Fact, Lack, Missing, NoneTogether, NoObject, Search
 from bbtc.ground.normal import conjuncts
 from bbtc.ground.reach import Reach, reach
 from bbtc.ground.refused import refused
@@ -91,7 +91,7 @@ def _never(
     )
 
 
-def _is_unknown(what: Root) -> bool:
+def _is_unknown(what: Lack) -> bool:
     return isinstance(what, Fact) and what.value is Truth.UNKNOWN
 
 
@@ -234,7 +234,7 @@ def _name(model: md.Model, universe: Universe, fact: Fact) -> str:
     return ground_name(fact.predicate, _args(model, universe, fact))
 
 
-def _all_written(model: md.Model, universe: Universe, facts: Sequence[Root]) -> str:
+def _all_written(model: md.Model, universe: Universe, facts: Sequence[Lack]) -> str:
     return " ".join(_written(model, universe, fact) for fact in facts if isinstance(fact, Fact))
 
 

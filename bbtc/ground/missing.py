@@ -1,9 +1,7 @@
 """What is missing at the root of a goal that nothing can make true: down from the goal, through what could
-set each fact and what that needs, to facts that nothing at all brings about.
+set each fact and what that needs, to facts that nothing at all brings about (:mod:`bbtc.ground.repair`).
 
-Who could set a fact are alternatives, what one of them needs stands together: an AND-OR graph, of which the
-cheapest repair is told (the fewest things to add). What the relaxed reachability of a model cannot reach,
-nothing can.
+What the relaxed reachability of a model cannot reach, nothing can.
 """
 
 from __future__ import annotations
@@ -17,25 +15,20 @@ from typing_extensions import assert_never
 from bbtc.ground.normal import conjuncts, normal_form
 from bbtc.ground.program import all_groups
 from bbtc.ground.reach import Reach
+from bbtc.ground.repair import Need, Repairs, Root, Some, Way, every, some
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
 from bbtc.source import Span
 
-_MOST_FACTS = 2000
-"""So many impossible facts are followed at most; those beyond count as roots."""
 _MOST_MEMBERS = 20
 """A quantifier over more objects is asked for any of them."""
-_COSTS = {"unknown": 2, "fact": 3, "object": 3, "together": 4}
+_COSTS = {"unknown": 2.0, "fact": 3.0, "object": 3.0, "together": 4.0}
 """What it takes to put a root right: an action that nobody can take is explained last."""
-_GIVEN = 1000.0
-"""What it takes to give a fact at the start that actions could bring about: told only where each of them
-needs that very fact, somewhere on its way."""
 
 _Env: TypeAlias = Mapping[str, int]
 _Row: TypeAlias = tuple[int | None, ...]
-_NEVER = float("inf")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,38 +57,9 @@ class NoneTogether:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
-Root: TypeAlias = Fact | NoObject | NoneTogether
-
-
-@dataclass(frozen=True, slots=True)
-class _Every:
-    parts: tuple[_Need, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class _Some:
-    parts: tuple[_Need, ...]
-
-
-_Need: TypeAlias = Root | _Every | _Some
-
-
-@dataclass(frozen=True, slots=True)
-class _Way:
-    """Something that would give a fact its value, were it not for what it needs."""
-
-    by: str
-    need: _Need
-
-
-@dataclass(frozen=True, slots=True)
-class Missing:
-    """What is missing, and the action that needs it (None: the goal itself). ``setters`` could bring it
-    about, but need it themselves."""
-
-    what: Root
-    by: str | None
-    setters: tuple[str, ...] = ()
+Lack: TypeAlias = Fact | NoObject | NoneTogether
+Missing: TypeAlias = Root[Lack]
+_Need: TypeAlias = Need[Lack]
 
 
 class Search:
@@ -127,18 +91,12 @@ class Search:
             setter = _Setter(rule.predicate, rule.span, rule.parameters, rule.args, (unknown,))
             self._setters.setdefault((rule.predicate, Truth.UNKNOWN), []).append(setter)
         self._possible: dict[Fact, bool] = {}
-        self._ways: dict[Fact, list[_Way]] = {}
-        self._costs: dict[Fact, float] = {}
+        self._repairs: Repairs[Lack] = Repairs(self._ways_to, lambda lack: _COSTS[_kind(lack)], limits)
 
     def missing(self, part: mf.Formula) -> tuple[Missing, ...]:
         """What a part of the goal that nothing can make true lacks, nearest to the goal first; empty where
         that cannot be told."""
-        need = self._need(normal_form(part), {})
-        if need is None:
-            return ()
-        self._explore(need)
-        self._spread()
-        return tuple(self._roots(need))
+        return self._repairs.roots(self._need(normal_form(part), {}))
 
     # --- what a condition lacks ----------------------------------------------------------------
 
@@ -153,15 +111,15 @@ class Search:
             case mf.Test(kind, atom, span):
                 values = (Truth.UNKNOWN,) if kind == "unknown" else (Truth.TRUE, Truth.FALSE)
                 row = self._row(atom.args, env)
-                return _some(self._lacking(Fact(atom.predicate, row, value, span)) for value in values)
+                return some(self._lacking(Fact(atom.predicate, row, value, span)) for value in values)
             case mf.Equal(left, right):
-                return None if self._may_equal(left, right, env, same=True) else _Some(())
+                return None if self._may_equal(left, right, env, same=True) else Some(())
             case mf.Not(mf.Equal(left, right)):
-                return None if self._may_equal(left, right, env, same=False) else _Some(())
+                return None if self._may_equal(left, right, env, same=False) else Some(())
             case mf.And(parts):
-                return _every(self._need(part, env) for part in parts)
+                return every(self._need(part, env) for part in parts)
             case mf.Or(parts):
-                return _some(self._need(part, env) for part in parts)
+                return some(self._need(part, env) for part in parts)
             case mf.Quantified(kind, (parameter,), inner):
                 return self._quantified(kind, parameter, inner, env)
             case mf.Not() | mf.Quantified():
@@ -178,7 +136,7 @@ class Search:
         if len(members) > _MOST_MEMBERS:
             return self._need(inner, free)
         each = (self._need(inner, {**free, parameter.name: member}) for member in members)
-        return _some(each) if kind == "exists" else _every(each)
+        return some(each) if kind == "exists" else every(each)
 
     def _lacking(self, fact: Fact) -> Fact | None:
         if fact not in self._possible:
@@ -213,19 +171,9 @@ class Search:
 
     # --- who could bring it about --------------------------------------------------------------
 
-    def _explore(self, need: _Need) -> None:
-        """The ways to every fact that the need leads to."""
-        todo = list(_facts(need))
-        for fact in todo:  # grows while it is read: breadth first
-            if fact in self._ways:
-                continue
-            self._limits.check_time("grounding")
-            few = len(self._ways) < _MOST_FACTS
-            self._ways[fact] = list(self._ways_to(fact)) if few else []
-            for way in self._ways[fact]:
-                todo.extend(_facts(way.need))
-
-    def _ways_to(self, fact: Fact) -> Iterator[_Way]:
+    def _ways_to(self, fact: Lack) -> Iterator[Way[Lack]]:
+        if not isinstance(fact, Fact):
+            return
         derived = fact.predicate in self.reach.usage.derived
         if fact.value is Truth.UNKNOWN and not derived:
             return  # what is not known is, nearly always, for `:init` to say
@@ -234,14 +182,14 @@ class Search:
             for env in [] if unified is None else self._narrowed(setter, unified):
                 yield self._way(setter, env)
 
-    def _way(self, setter: _Setter, env: _Env) -> _Way:
+    def _way(self, setter: _Setter, env: _Env) -> Way[Lack]:
         needs: list[_Need | None] = [
             NoObject(parameter.types, parameter.span)
             for parameter in setter.parameters
             if parameter.name not in env and not self.universe.members(parameter.types)
         ]
         needs.extend(self._need(part, env) for part in setter.needs)
-        return _Way(setter.by, _every(needs) or NoneTogether(setter.by, setter.span))
+        return Way(setter.by, every(needs) or NoneTogether(setter.by, setter.span))
 
     def _narrowed(self, setter: _Setter, env: dict[str, int]) -> list[dict[str, int]]:
         """The ways to bind more parameters by what never changes, as long as they are few: a map tells where
@@ -294,59 +242,6 @@ class Search:
                 return None
         return env
 
-    # --- the cheapest repair -------------------------------------------------------------------
-
-    def _spread(self) -> None:
-        """The cost of each fact, the least that fits all ways: later facts first, until nothing changes."""
-        order = [*reversed(self._ways)]
-        self._costs = {fact: _GIVEN if self._ways[fact] else float(_COSTS[_kind(fact)]) for fact in order}
-        changed = True
-        while changed:
-            self._limits.check_time("grounding")
-            changed = False
-            for fact in order:
-                least = min((self._cost(way.need) for way in self._ways[fact]), default=_NEVER)
-                if least < self._costs[fact]:
-                    self._costs[fact] = least
-                    changed = True
-
-    def _cost(self, need: _Need) -> float:
-        match need:
-            case Fact():
-                return self._costs[need]
-            case NoObject() | NoneTogether():
-                return float(_COSTS[_kind(need)])
-            case _Every(parts):
-                return sum(map(self._cost, parts), 0.0)
-            case _Some(parts):
-                return min(map(self._cost, parts), default=_NEVER)
-            case _:
-                assert_never(need)
-
-    def _roots(self, need: _Need) -> Iterator[Missing]:
-        """The roots of the cheapest repair, nearest first."""
-        seen: set[Root] = set()
-        todo: list[tuple[_Need, str | None]] = [(need, None)]
-        for each, by in todo:  # grows while it is read: breadth first
-            match each:
-                case _Every(parts):
-                    todo.extend((part, by) for part in parts)
-                case _Some(parts):
-                    todo.extend((part, by) for part in sorted(parts, key=self._cost)[:1])
-                case Fact() | NoObject() | NoneTogether():
-                    if each in seen:
-                        continue
-                    seen.add(each)
-                    ways = self._ways[each] if isinstance(each, Fact) else []
-                    fresh = [way for way in ways if seen.isdisjoint(_facts(way.need))]
-                    best = min(fresh, key=lambda way: self._cost(way.need), default=None)
-                    if best is None or self._cost(best.need) > self._cost(each):
-                        yield Missing(each, by, tuple(dict.fromkeys(way.by for way in ways)))
-                    else:
-                        todo.append((best.need, best.by))
-                case _:
-                    assert_never(each)
-
 
 @dataclass(frozen=True, slots=True)
 class _Setter:
@@ -359,31 +254,7 @@ class _Setter:
     needs: tuple[mf.Formula, ...]
 
 
-def _every(needs: Iterable[_Need | None]) -> _Need | None:
-    found = [need for need in needs if need is not None]
-    return None if not found else found[0] if len(found) == 1 else _Every(tuple(found))
-
-
-def _some(needs: Iterable[_Need | None]) -> _Need | None:
-    """One of them is enough: nothing is lacking if one lacks nothing."""
-    found: list[_Need] = []
-    for need in needs:
-        if need is None:
-            return None
-        found.append(need)
-    return found[0] if len(found) == 1 else _Some(tuple(found))
-
-
-def _facts(need: _Need) -> Iterator[Fact]:
-    todo = [need]
-    for each in todo:
-        if isinstance(each, Fact):
-            yield each
-        elif isinstance(each, (_Every, _Some)):
-            todo.extend(each.parts)
-
-
-def _kind(root: Root) -> str:
+def _kind(root: Lack) -> str:
     match root:
         case Fact():
             return "unknown" if root.value is Truth.UNKNOWN else "fact"
