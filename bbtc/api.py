@@ -68,7 +68,7 @@ def check(*sources: Source, limits: Limits | None = None) -> list[Diagnostic]:
     report = Report()
     documents = pipeline.parse_all(_read(sources, limits), report, limits)
     if not report.errors:
-        pipeline.check_documents(documents, report)
+        pipeline.check_documents(documents, report, limits)
     return list(report)
 
 

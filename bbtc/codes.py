@@ -7,6 +7,9 @@ Ranges: 00xx files and limits, 01xx syntax, 02xx names and types, 03xx checks (w
 
 from __future__ import annotations
 
+ROOT_CAUSES = frozenset({"BBT0315", "BBT0316", "BBT0412"})
+"""Told before everything else: much of that may follow from them."""
+
 CODES: dict[str, str] = {
     # 00xx: files and limits
     "BBT0001": "file cannot be read",
@@ -67,6 +70,8 @@ CODES: dict[str, str] = {
     "BBT0309": "unused parameter",
     "BBT0310": "unused template",
     "BBT0311": "requirements that do not match the content",
+    "BBT0315": "fact that nothing makes unknown",
+    "BBT0316": "goal that nothing can make true",
     # 04xx: grounding
     "BBT0403": "too many initial states",
     "BBT0404": "oneof in the initial state",

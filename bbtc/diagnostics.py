@@ -6,7 +6,7 @@ import enum
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from bbtc.codes import CODES
+from bbtc.codes import CODES, ROOT_CAUSES
 from bbtc.printable import printable, printable_line
 from bbtc.source import Span
 
@@ -65,7 +65,7 @@ class Diagnostic:
 
 @dataclass(slots=True)
 class Report:
-    """Collects the diagnostics of a run, in source order within a file."""
+    """Collects the diagnostics of a run: root causes first, then in source order within a file."""
 
     _recorded: dict[Diagnostic, None] = field(default_factory=dict)
 
@@ -95,6 +95,17 @@ class Report:
         """Record a diagnostic unless the very same one stands already."""
         self._recorded.setdefault(diagnostic)
 
+    def retract(self, code: str, within: Span) -> None:
+        """Take back what was recorded under the code about places within another: something else tells it."""
+        self._recorded = {
+            each: None
+            for each in self._recorded
+            if each.code != code
+            or each.span is None
+            or each.span.source is not within.source
+            or not within.start <= each.span.start < within.end
+        }
+
     @property
     def errors(self) -> list[Diagnostic]:
         """The diagnostics that stop a command."""
@@ -109,9 +120,9 @@ class Report:
             raise BbtcError(tuple(self))
 
 
-def _place_key(diagnostic: Diagnostic) -> tuple[str, int]:
-    span = diagnostic.span
-    return (span.source.name, span.start) if span else ("", -1)
+def _place_key(diagnostic: Diagnostic) -> tuple[bool, str, int]:
+    span, follows = diagnostic.span, diagnostic.code not in ROOT_CAUSES
+    return (follows, span.source.name, span.start) if span else (follows, "", -1)
 
 
 class BbtcError(Exception):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from bbtc.diagnostics import BbtcError, Diagnostic, Related, Report, Severity
+from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Report, Severity
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
@@ -88,10 +88,11 @@ def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
     return model
 
 
-def check_documents(documents: Iterable[Document], report: Report) -> None:
+def check_documents(documents: Iterable[Document], report: Report, limits: Limits | None = None) -> None:
     """Everything that is wrong or doubtful in domains and problems, to the report. Each problem is checked
     with the domain of its name; what rests on one problem is a warning only where it holds for all of
-    its domain's. What is right but cannot be grounded is noted."""
+    its domain's. What is right but cannot be grounded is noted. Whether a goal can be reached at all is
+    told where the limits, and bounds of its own, allow to find out."""
     from bbtc.analysis.check import check
     from bbtc.analysis.resolve import resolve
     from bbtc.ground.refused import refused
@@ -128,11 +129,35 @@ def check_documents(documents: Iterable[Document], report: Report) -> None:
             models.extend([] if model is None else [model])
             for diagnostic in own:
                 report.add(diagnostic)
-        for diagnostic in check(*models) if models else ():
+        doubted = []
+        for model in models:
+            doubts = _doubts(model, limits or Limits())
+            doubted.extend([model.problem] if doubts and model.problem else [])
+            for diagnostic in doubts:
+                report.add(diagnostic)
+        for diagnostic in check(*models, doubted=doubted) if models else ():
             report.add(diagnostic)
         for model in models:
             for diagnostic in refused(model):
                 report.add(replace(diagnostic, severity=Severity.NOTE))
+
+
+_CHECKED_FACTS = 300_000
+"""So many facts are derived at most to find out in a check whether a goal can be reached: a second or two."""
+
+
+def _doubts(model: Model, limits: Limits) -> list[Diagnostic]:
+    """What is wrong with the start or the goal of a problem, the roots of much else. What cannot be grounded,
+    or not within the limits, is judged by its predicates alone."""
+    from bbtc.analysis.start import hopeless, not_unknown
+    from bbtc.ground.goal import goal_doubts
+
+    few = replace(limits, facts=min(limits.facts, _CHECKED_FACTS))
+    try:
+        found = goal_doubts(model, few)
+    except LimitReached:
+        found = None
+    return (list(hopeless(model)) if found is None else found) or list(not_unknown(model))
 
 
 def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:
@@ -173,7 +198,14 @@ def compile_sources(
     if inputs.problem is None:
         names = ", ".join(source.name for source in sources)
         raise BbtcError.single("BBT0006", f"no problem in {names}", hint="give the problem's file, too")
-    return ground_model(resolve_model(inputs, report, checks=checks), report, limits)
+    model = resolve_model(inputs, report, checks=checks)
+    try:
+        return ground_model(model, report, limits)
+    except BbtcError:
+        if model.goal_span is not None and any(error.code == "BBT0412" for error in report.errors):
+            report.retract("BBT0304", model.goal_span)  # the error tells more
+            report.raise_errors()
+        raise
 
 
 def task_of_sources(sources: Sequence[SourceFile], report: Report, limits: Limits) -> Task:

@@ -7,7 +7,7 @@ warning only where it holds for every one of several problems.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -37,12 +37,16 @@ class Check:
     needs_problem: bool = False
 
 
-def check(*models: md.Model) -> Iterator[Diagnostic]:
+def check(*models: md.Model, doubted: Collection[str] = ()) -> Iterator[Diagnostic]:
     """The findings about a domain: the models are those of one domain with each of its problems, or
-    that of the domain alone."""
+    that of the domain alone. Of problems named in ``doubted`` the goal or the start is known to be wrong:
+    what rests on them would only repeat it, and is not looked for."""
+    settled = tuple(model for model in models if model.problem not in doubted)
     for each in CHECKS:
-        if models[0].problem is not None or not each.needs_problem:
+        if not each.needs_problem:
             yield from _merged(each, models)
+        elif models[0].problem is not None and settled:
+            yield from _merged(each, settled)
 
 
 def _merged(each: Check, models: tuple[md.Model, ...]) -> Iterator[Diagnostic]:

@@ -102,6 +102,12 @@ def settings(effect: me.Effect) -> Iterator[me.Set]:
     return (leaf for leaf in me.leaves(effect) if isinstance(leaf, me.Set))
 
 
+def set_values(model: md.Model, predicate: str) -> set[Truth]:
+    """The values that actions may give atoms of the predicate."""
+    leaves = (leaf for schema in model.schemas.values() for leaf in settings(schema.effect))
+    return {leaf.value for leaf in leaves if leaf.predicate == predicate}
+
+
 def observed(schema: md.Schema) -> set[str]:
     """Predicates that ``:observe`` makes known."""
     if schema.observe is None:

@@ -13,6 +13,7 @@ from bbtc.belief.simulate import Figures
 from bbtc.belief.state import Values
 from bbtc.belief.tick import Status
 from bbtc.kleene import Truth
+from bbtc.plan.failing_runs import FailingRun
 from bbtc.tree.nodes import Tree
 
 
@@ -53,7 +54,7 @@ def figures_to_json(
         "scenarios": [
             {
                 "p": figure_text(run.probability),
-                "status": "blocked" if run.status is Status.RUNNING else run.status.word,
+                "status": _ending(run.status),
                 "initial": assign(run.initial),
                 "steps": [
                     {"node": step.node.id, "action": step.node.action, "assign": assign(step.values)}
@@ -71,6 +72,47 @@ def figures_to_json(
             "cut": sampling.cut,
         }
     return data
+
+
+def failing_run_to_json(tree: Tree, failing: FailingRun) -> dict[str, Any]:
+    """A run that fails: its actions with what each changed, the facts it lacks at the root, and where it
+    stopped."""
+    variables, run, stop = tree.task.variables, failing.run, failing.stop
+    befores = [run.initial, *(step.values for step in run.steps)]
+    return {
+        "p": figure_text(run.probability),
+        "status": _ending(run.status),
+        "steps": [
+            {
+                "node": step.node.id,
+                "action": step.node.action,
+                "changes": {
+                    variable.name: Truth(new).word
+                    for variable, old, new in zip(variables, before, step.values, strict=True)
+                    if old != new
+                },
+            }
+            for before, step in zip(befores, run.steps, strict=False)
+        ],
+        "missing": [
+            {
+                "fact": block.fact,
+                "needed": block.value.word,
+                "now": block.now.word,
+                "by": block.action,
+                "setters": [*block.setters],
+            }
+            for block in failing.blocks
+        ],
+        "lost": [condition_to_json(part, variables) for part in failing.lost],
+        "node": stop.node,
+        "condition": None if stop.condition is None else condition_to_json(stop.condition, variables),
+        "value": None if stop.status is None else _truth(stop.status),
+    }
+
+
+def _ending(status: Status) -> str:
+    return "blocked" if status is Status.RUNNING else status.word
 
 
 def _truth(status: Status) -> str:

@@ -22,6 +22,15 @@ class Failing(NamedTuple):
     depth: int
 
 
+class Stop(NamedTuple):
+    """What stopped a run: the deepest condition that was not true, with its node and whether that was false
+    or unknown; a retry node of which the attempts are used up, with neither; or nothing that was asked."""
+
+    node: str | None
+    condition: Condition | None
+    status: Status | None
+
+
 class FailureFinder:
     """Finds the conditions that fail in a state, for one tree."""
 
@@ -52,6 +61,18 @@ class FailureFinder:
             if isinstance(node, ConditionNode) or self._lacks_precondition(node, state)
         ]
         return sorted(found, key=lambda f: (f.status != root, -f.depth))
+
+    def stopped(self, state: State) -> Stop:
+        """What stopped a run in a final state."""
+        used_up = self.used_up(state)
+        if used_up is not None:
+            return Stop(used_up, None, None)
+        failing = self.failing(state)
+        return (
+            Stop(failing[0].node, failing[0].condition, failing[0].status)
+            if failing
+            else Stop(None, None, None)
+        )
 
     def used_up(self, state: State) -> str | None:
         """The retry node that refused an action for want of attempts; None if none did."""

@@ -32,6 +32,8 @@ class Scenario:
     initial: Values
     steps: tuple[ScenarioStep, ...]
     status: Status
+    end: int
+    """The state of the chain that it ends in."""
 
     @property
     def final(self) -> Values:
@@ -45,20 +47,23 @@ _LISTING = "the listing of runs"
 _Path = tuple[int, "_Path | None"]  # last state, and the path before it
 
 
-def scenarios(chain: Chain, limits: Limits) -> Iterator[Scenario]:
+def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterator[Scenario]:
     """Every scenario in order of decreasing probability (ties in breadth-first order of the
     states). Endless where the chain has loops: take as many as needed. Runs that never end are none.
+    ``failing``: only those that end without success, however rare they are among the others.
 
     Raises :class:`bbtc.diagnostics.LimitReached` past the limits on states (here: of steps in runs) and
     time: of an action that nearly always fails and is tried again, each run is nearly as probable as the
     one before.
     """
-    ending = _ending(chain)
-    queue: list[tuple[Fraction, int, _Path]] = []
+    ends = [end for end in chain.final if not failing or chain.status[end] is not Status.SUCCESS]
+    best = _best_ends(chain, ends, limits) if failing else dict.fromkeys(_ending(chain, ends), Fraction(1))
+    # By the best that a beginning may still become; of all runs, by what it is: each soon comes to an end.
+    queue: list[tuple[Fraction, int, Fraction, _Path]] = []
     count = 0
     for probability, state in chain.initial:
-        if state in ending:
-            heapq.heappush(queue, (-probability, count, (state, None)))
+        if state in best and probability:
+            heapq.heappush(queue, (-probability * best[state], count, probability, (state, None)))
             count += 1
     for step in itertools.count():
         if not queue:
@@ -67,27 +72,54 @@ def scenarios(chain: Chain, limits: Limits) -> Iterator[Scenario]:
             limits.check_time(_LISTING, step)
         if step > limits.states:
             limits.check_states(step, _LISTING)
-        negative, _, path = heapq.heappop(queue)
-        edges = chain.edges[path[0]]
-        if not edges:
-            yield _scenario(chain, -negative, path)
-        # Results that differ in cost or reward only are one scenario.
-        merged: dict[int, Fraction] = {}
-        for edge in edges:
-            if edge.target in ending:
-                merged[edge.target] = merged.get(edge.target, Fraction(0)) + edge.result.probability
-        for target, probability in merged.items():
-            heapq.heappush(queue, (negative * probability, count, (target, path)))
-            count += 1
+        _, _, reached, path = heapq.heappop(queue)
+        if not chain.edges[path[0]]:
+            yield _scenario(chain, reached, path)
+        for target, probability in _merged(chain, path[0]).items():
+            if target in best:
+                now = reached * probability
+                heapq.heappush(queue, (-now * best[target], count, now, (target, path)))
+                count += 1
 
 
-def _ending(chain: Chain) -> set[int]:
-    """The states from which a run may end."""
+def _merged(chain: Chain, state: int) -> dict[int, Fraction]:
+    """Where a step leads: results that differ in cost or reward only are one."""
+    merged: dict[int, Fraction] = {}
+    for edge in chain.edges[state]:
+        merged[edge.target] = merged.get(edge.target, Fraction(0)) + edge.result.probability
+    return merged
+
+
+def _best_ends(chain: Chain, ends: Sequence[int], limits: Limits) -> dict[int, Fraction]:
+    """The probability of the most probable way to one of the ends, for each state that has one (Dijkstra,
+    from the ends back)."""
+    before: list[list[tuple[int, Fraction]]] = [[] for _ in chain.states]
+    for state in range(len(chain.states)):
+        for target, probability in _merged(chain, state).items():
+            before[target].append((state, probability))
+    best: dict[int, Fraction] = {}
+    queue = [(Fraction(-1), end) for end in ends]
+    heapq.heapify(queue)
+    while queue:
+        negative, state = heapq.heappop(queue)
+        if state in best:
+            continue
+        if len(best) % _LOOK == 0:
+            limits.check_time(_LISTING)
+        best[state] = -negative
+        for earlier, probability in before[state]:
+            if earlier not in best and probability:
+                heapq.heappush(queue, (negative * probability, earlier))
+    return best
+
+
+def _ending(chain: Chain, ends: Sequence[int]) -> set[int]:
+    """The states from which a run may come to one of the ends."""
     before: list[list[int]] = [[] for _ in chain.states]
     for state, edges in enumerate(chain.edges):
         for edge in edges:
             before[edge.target].append(state)
-    ending = set(chain.final)
+    ending = set(ends)
     waiting = list(ending)
     while waiting:
         for state in before[waiting.pop()]:
@@ -112,6 +144,7 @@ def _scenario(chain: Chain, probability: Fraction, path: _Path) -> Scenario:
             for before, after in itertools.pairwise(visited)
         ),
         status=chain.status[visited[-1]],
+        end=visited[-1],
     )
 
 

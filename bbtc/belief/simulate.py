@@ -100,13 +100,8 @@ def _shares(task: Task, root: Node, chain: Chain, visits: list[Fraction | None])
         probability = visits[state]
         if chain.status[state] is Status.SUCCESS or not probability:
             continue
-        failing = finder.failing(chain.states[state])
-        key: tuple[str, Condition | None, Status] = (root.id, None, chain.status[state])
-        used_up = finder.used_up(chain.states[state])
-        if used_up is not None:
-            key = (used_up, None, chain.status[state])
-        elif failing:
-            key = (failing[0].node, failing[0].condition, failing[0].status)
+        node, condition, status = finder.stopped(chain.states[state])
+        key = (node or root.id, condition, chain.status[state] if status is None else status)
         shares[key] = shares.get(key, Fraction(0)) + probability
     order = {node.id: position for position, node in enumerate(walk(root))}
     ranked = sorted(shares.items(), key=lambda item: (-item[1], order[item[0][0]], item[0][2]))

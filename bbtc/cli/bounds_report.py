@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from bbtc.artefacts.numbers import figure_text
-from bbtc.cli.wording import counted, exact, oneof_note, within
+from bbtc.cli.wording import at, block_line, counted, exact, oneof_note, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
-from bbtc.kleene import Truth
 from bbtc.plan.bounds import TaskValue
-from bbtc.plan.why_not import Block, DeadEnd
-from bbtc.source import Span
+from bbtc.plan.why_not import DeadEnd
 from bbtc.tree.nodes import Tree
 
 _MOST_ENDS = 10  # dead ends told
@@ -70,28 +68,14 @@ def dead_end_lines(ends: Sequence[DeadEnd], max_actions: int | None = None) -> l
         lines.append(f"  {exact(late)}: too few of the {counted(max_actions, 'action')} are left")
     for end in ends[:_MOST_ENDS]:
         why = " and ".join(end.lost) or "the goal as a whole"
-        when = "from the start" if end.action is None else f"after {end.action}{_at(end.span)}"
+        when = "from the start" if end.action is None else f"after {end.action}{at(end.span)}"
         lines.append(f"  {exact(end.probability)}: {when}, nothing can bring about {why}")
-        lines.extend(f"    {_block(block)}" for block in end.blocks[:_MOST_BLOCKS])
+        lines.extend(f"    {block_line(block)}" for block in end.blocks[:_MOST_BLOCKS])
     rest = ends[_MOST_ENDS:]
     if rest:
         probability = exact(sum((end.probability for end in rest), Fraction(0)))
         lines.append(f"  {probability}: {counted(len(rest), 'more way')} to end without the goal")
     return lines
-
-
-def _block(block: Block) -> str:
-    needing = f"the goal{_at(block.span)}" if block.action is None else f"{block.action}{_at(block.span)}"
-    if block.value is Truth.UNKNOWN:
-        return f"{needing} needs {block.fact} to be unknown, and no action makes it that"
-    negation = "" if block.value is Truth.TRUE else "not "
-    if block.now is Truth.UNKNOWN:
-        return f"{needing} needs {negation}{block.fact}, which is unknown: no action observes or achieves it"
-    return f"{needing} needs {negation}{block.fact}, and no action makes that true"
-
-
-def _at(span: Span | None) -> str:
-    return "" if span is None else f" [{span.place}]"
 
 
 def bounds_json(value: TaskValue, target: Fraction) -> str:

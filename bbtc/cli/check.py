@@ -70,7 +70,7 @@ def command(
     try:
         documents = parse_all([session.read(file) for file in files], report, session.limits)
         if not report.errors:
-            check_documents(documents, report)
+            check_documents(documents, report, session.limits)
     finally:
         for diagnostic in chosen(report, sum(select, ()), sum(ignore, ())):
             session.report.add(diagnostic)

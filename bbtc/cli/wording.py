@@ -2,32 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
 
 from bbtc.artefacts.numbers import exact
+from bbtc.belief.scenarios import Scenario
 from bbtc.belief.simulate import Figures
 from bbtc.belief.tick import Status
 from bbtc.cli.counting import counted
+from bbtc.ground.condition import Condition
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
+from bbtc.plan.failing_runs import FailingRun
 from bbtc.plan.result import Plan, Refinement
+from bbtc.plan.why_not import Block
 from bbtc.printable import printable
+from bbtc.source import Span
 from bbtc.tree.nodes import Tree, retries_of, walk
 
 __all__ = [
+    "at",
+    "block_line",
     "changes",
     "counted",
     "exact",
+    "failing_lines",
     "figures_report",
     "oneof_note",
     "plan_summary",
     "refinement_line",
+    "run_lines",
     "simplified_line",
     "within",
 ]
 
 _MOST_NAMED = 5  # actions named of many
+_MOST_BLOCKS = 3  # causes told of one run
+_MOST_STEPS = 12  # actions told of one run
 
 
 def changes(tree: Tree, before: bytes, after: bytes) -> str:
@@ -115,17 +127,8 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
         lines.append(f"blocked   {exact(figures.blocked)}")
     if figures.endless:
         lines.append(f"endless   {exact(figures.endless)}")
-    attempts = {node.id: number for node, number in retries_of(tree.root)}
     for share in figures.failures:
-        what = "no condition failed"
-        if share.condition is None and share.node in attempts:
-            number = attempts[share.node]
-            what = "the only attempt used up" if number == 1 else f"all {number} attempts used up"
-            if share.status is Status.RUNNING:
-                what += " (blocked)"
-        elif share.condition is not None:
-            word = "unknown" if share.status is Status.RUNNING else "false"
-            what = f"{describe(tree.task, share.condition)} is {word}"
+        what = _stopped(tree, share.node, share.condition, share.status)
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")
     lines.append(f"cost      {expected(figures.cost, figures.cost_given_success)}")
     lines.append(f"actions   {expected(figures.actions, figures.actions_given_success)}")
@@ -134,6 +137,84 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     if note:
         lines.append(f"oneof     {note}")
     return lines
+
+
+def _stopped(tree: Tree, node: str, condition: Condition | None, status: Status) -> str:
+    """What stopped a run at a node, in words."""
+    if condition is not None:
+        word = "unknown" if status is Status.RUNNING else "false"
+        return f"{describe(tree.task, condition)} is {word}"
+    number = {retry.id: attempts for retry, attempts in retries_of(tree.root)}.get(node)
+    if number is None:
+        return "no condition failed"
+    what = "the only attempt used up" if number == 1 else f"all {number} attempts used up"
+    return f"{what} (blocked)" if status is Status.RUNNING else what
+
+
+def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> list[str]:
+    """The most probable runs that fail: what each lacks, and what it did; the others in sum."""
+    lines = ["failing runs, the most probable first:"] if runs else []
+    for each in runs:
+        status = each.run.status
+        ending = ", blocked" if status is Status.RUNNING else ""
+        whys = [block_line(block) for block in each.blocks[:_MOST_BLOCKS]]
+        if not whys and each.lost:
+            lost = " and ".join(describe(tree.task, part) for part in each.lost)
+            whys = [f"nothing can bring about {lost}"]
+        if not whys:
+            node, condition = each.stop.node or tree.root.id, each.stop.condition
+            what = _stopped(tree, node, condition, status if each.stop.status is None else each.stop.status)
+            whys = [f"{what}, node {node}: the tree has nothing left to try"]
+        lines.append(f"  {exact(each.run.probability)}{ending}: {whys[0]}")
+        lines.extend(f"    and {why}" for why in whys[1:])
+        lines.extend(f"    {line}" for line in _steps(tree, each.run))
+    if rest and runs:
+        lines.append(f"  {exact(rest)}: other runs")
+    return lines
+
+
+def run_lines(tree: Tree, run: Scenario) -> list[str]:
+    """The actions of a run, each with what its outcome changed."""
+    befores = [run.initial, *(step.values for step in run.steps)]
+    return [
+        f"{step.node.action}: {changes(tree, before, step.values)}"
+        for before, step in zip(befores, run.steps, strict=False)
+    ]
+
+
+def _steps(tree: Tree, run: Scenario) -> list[str]:
+    """The actions of a run; of very many, the last ones."""
+    lines = run_lines(tree, run) or ["no action started"]
+    left_out = len(lines) - _MOST_STEPS
+    if left_out <= 1:
+        return lines
+    return [f"{counted(left_out, 'action')} before, then", *lines[left_out:]]
+
+
+def block_line(block: Block) -> str:
+    """A fact that nothing brings back, in words."""
+    needing = f"the goal{at(block.span)}" if block.action is None else f"{block.action}{at(block.span)}"
+    if block.setters:
+        listed = ", ".join(block.setters[:_MOST_BLOCKS])
+        more = f" and {len(block.setters) - _MOST_BLOCKS} more" if len(block.setters) > _MOST_BLOCKS else ""
+        value = {
+            Truth.TRUE: block.fact,
+            Truth.FALSE: f"not {block.fact}",
+            Truth.UNKNOWN: f"unknown {block.fact}",
+        }
+        what = value[block.value]
+        return f"{needing} needs {what}, and nothing brings it back: {listed}{more} cannot without it"
+    if block.value is Truth.UNKNOWN:
+        return f"{needing} needs {block.fact} to be unknown, and no action makes it that"
+    negation = "" if block.value is Truth.TRUE else "not "
+    if block.now is Truth.UNKNOWN:
+        return f"{needing} needs {negation}{block.fact}, which is unknown: no action observes or achieves it"
+    return f"{needing} needs {negation}{block.fact}, and no action makes that true"
+
+
+def at(span: Span | None) -> str:
+    """Where it stands, in brackets; nothing where that is not known."""
+    return "" if span is None else f" [{span.place}]"
 
 
 def expected(value: Fraction | None, given_success: Fraction | None) -> str:

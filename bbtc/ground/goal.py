@@ -1,48 +1,252 @@
-"""Says why a goal cannot be reached."""
+"""Says why a goal cannot be reached, and what would have to be so."""
 
 from __future__ import annotations
 
-from bbtc.diagnostics import Report
+from collections.abc import Iterator, Sequence
+
+from typing_extensions import assert_never
+
+from bbtc.diagnostics import Diagnostic, Related, Report, Severity
+from bbtc.ground.atoms import Atoms
+from bbtc.ground.lower import Lowering
+from bbtc.ground.missing import Fact, Lack, Missing, NoneTogether, NoObject, Search
+from bbtc.ground.normal import conjuncts
+from bbtc.ground.reach import Reach, reach
+from bbtc.ground.refused import refused
+from bbtc.ground.start import beginning
+from bbtc.ground.task import ground_name
+from bbtc.ground.universe import Row, Universe
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 
 _LONGEST = 60
+_MOST_NAMED = 3
+"""Roots told of one part of the goal, and facts named in one message."""
 
 
-def unreachable(model: md.Model, part: mf.Formula, report: Report) -> None:
-    """Report a part of the goal that is false even if nothing is ever undone."""
-    span = part.span or model.goal_span
-    shown = "the goal" if span is None else f"`{' '.join(span.text.split())}`"
-    if len(shown) > _LONGEST:
-        shown = f"{shown[: _LONGEST - 4]}...`"
-    report.error(
+def unreachable(model: md.Model, part: mf.Formula, atoms: Atoms, limits: Limits) -> Diagnostic:
+    """The error about a part of the goal that is false even if nothing is ever undone. Raises
+    :class:`bbtc.diagnostics.LimitReached`."""
+    missing = Search(atoms.reach, limits).missing(part)
+    hint = _hint(atoms.reach, missing)
+    forgotten = [each.what for each in missing[:_MOST_NAMED] if _is_unknown(each.what)]
+    if hint is not None and forgotten:
+        hint += f": add `{_all_written(model, atoms.universe, forgotten)}` to `:init`"
+    return Diagnostic(
         "BBT0412",
-        f"the goal cannot be reached: no action ever achieves {shown}",
-        span,
-        _achievers(model, part),
+        f"the goal cannot be reached: no action ever achieves {_shown(part, model)}",
+        part.span or model.goal_span,
+        hint,
+        related=_related(missing),
     )
 
 
-def _achievers(model: md.Model, part: mf.Formula) -> str | None:
-    """What could make an unreachable literal true, if the part is one."""
-    atom = part.part if isinstance(part, mf.Not) else part
-    if not isinstance(atom, mf.Atom) or model.predicates[atom.predicate].derived:
+def goal_doubts(model: md.Model, limits: Limits) -> list[Diagnostic] | None:
+    """Warnings about the parts of a problem's goal that nothing can make true, the root first: facts that
+    `:init` may have forgotten to call unknown. None for what cannot be grounded anyway. Raises
+    :class:`bbtc.diagnostics.LimitReached`."""
+    begun = Report()
+    if model.goal is None or any(True for _ in refused(model)):
         return None
-    value = Truth.FALSE if isinstance(part, mf.Not) else Truth.TRUE
-    setters = [
-        f"`{schema.name}`"
-        for schema in model.schemas.values()
-        if any(
-            isinstance(leaf, me.Set) and leaf.predicate == atom.predicate and leaf.value is value
-            for leaf in me.leaves(schema.effect)
-        )
-    ]
-    if not setters:
-        return f"no action makes `{atom.predicate}` {value.word}"
-    listed = ", ".join(setters[:5])
-    return (
-        f"only {listed} could, but cannot apply, or not to these objects: `bbtc check` may tell "
-        "which precondition is never true"
+    begin = beginning(model, begun, limits)
+    if begun.errors:
+        return None
+    reached = reach(model, begin, limits)
+    lowering = Lowering(Atoms(reached), limits)
+    search = Search(reached, limits)
+    found: list[Diagnostic] = []
+    forgotten: list[tuple[mf.Formula, tuple[Missing, ...]]] = []
+    for part in conjuncts(model.goal):
+        if lowering.is_never(part):
+            missing = search.missing(part)
+            if missing and all(_is_unknown(each.what) for each in missing):
+                forgotten.append((part, missing))
+            else:
+                found.append(_never(model, reached, [(part, missing)]))
+    if forgotten:
+        roots = {each.what: each for _, missing in forgotten for each in missing}
+        found[:0] = [
+            _forgotten(model, reached.universe, list(roots.values())),
+            _never(model, reached, forgotten),
+        ]
+    return found
+
+
+def _never(
+    model: md.Model, reached: Reach, parts: Sequence[tuple[mf.Formula, tuple[Missing, ...]]]
+) -> Diagnostic:
+    """The warning about parts of a goal that lack things of one kind."""
+    missing = list(dict.fromkeys(each for _, roots in parts for each in roots))
+    first, *others = [part for part, _ in parts]
+    return Diagnostic(
+        "BBT0316",
+        f"nothing can make the goal {_shown(first, model)} true",
+        first.span or model.goal_span,
+        _hint(reached, missing),
+        Severity.WARNING,
+        (*_related(missing), *(Related("nor this", part.span) for part in others[:_MOST_NAMED])),
     )
+
+
+def _is_unknown(what: Lack) -> bool:
+    return isinstance(what, Fact) and what.value is Truth.UNKNOWN
+
+
+def _forgotten(model: md.Model, universe: Universe, missing: Sequence[Missing]) -> Diagnostic:
+    """The warning about facts that nothing makes unknown, although something must find out about them."""
+    facts = [each.what for each in missing if isinstance(each.what, Fact)]
+    told = facts[:_MOST_NAMED]
+    more = f" or {len(facts) - len(told)} more" if len(facts) > len(told) else ""
+    names = " or ".join(f"`{_name(model, universe, fact)}`" for fact in told)
+    texts = _all_written(model, universe, told)
+    return Diagnostic(
+        "BBT0315",
+        f"nothing makes {names}{more} unknown",
+        model.init.span or model.problem_span,
+        f"add `{texts}` to `:init`: what it does not mention is false",
+        Severity.WARNING,
+        _related(missing[:_MOST_NAMED]),
+    )
+
+
+def _shown(part: mf.Formula, model: md.Model) -> str:
+    span = part.span or model.goal_span
+    if span is None:
+        return "the goal"
+    shown = " ".join(span.text.split())
+    return f"`{shown}`" if len(shown) <= _LONGEST - 2 else f"`{shown[: _LONGEST - 5]}...`"
+
+
+def _related(missing: Sequence[Missing]) -> tuple[Related, ...]:
+    """Where an action asks for what is missing."""
+    places = [
+        Related(f"`{each.by}` needs it here", each.what.span)
+        for each in missing[:_MOST_NAMED]
+        if each.by is not None and isinstance(each.what, Fact) and each.what.span is not None
+    ]
+    return tuple(dict.fromkeys(places))
+
+
+def _hint(reached: Reach, missing: Sequence[Missing]) -> str | None:
+    if not missing:
+        return None
+    told = [_told(reached, each) for each in missing[:_MOST_NAMED]]
+    more = f"; and {len(missing) - len(told)} more" if len(missing) > len(told) else ""
+    return "; ".join(told) + more
+
+
+def _told(reached: Reach, missing: Missing) -> str:
+    """One root in words."""
+    model, by = reached.usage.model, missing.by
+    match missing.what:
+        case Fact() as fact:
+            return _fact_told(reached, missing, fact)
+        case NoObject(types):
+            what = f"of type {' or '.join(f'`{name}`' for name in types)}"
+            if types == ("object",):
+                what = "at all"
+            return f"there is no object {what}" + (f" for `{by}`" if by is not None else "")
+        case NoneTogether(name):
+            whole = "precondition" if name in model.schemas else "condition"
+            return f"`{name}` could, but no objects meet its whole {whole}"
+        case _:
+            assert_never(missing.what)
+
+
+def _fact_told(reached: Reach, missing: Missing, fact: Fact) -> str:
+    model, universe = reached.usage.model, reached.universe
+    name, value, by = _name(model, universe, fact), fact.value, missing.by
+    if value is Truth.UNKNOWN:
+        start = "the goal" if by is None else f"`{by}`"
+        return f"{start} needs `{name}` to be unknown, and nothing makes it so"
+    if missing.setters:
+        listed = ", ".join(f"`{each}`" for each in missing.setters[:_MOST_NAMED])
+        return (
+            f"only {listed} can make `{name}` {value.word}, and cannot without it: is it missing in `:init`?"
+        )
+    if model.predicates[fact.predicate].derived:
+        return f"no rule ever makes `{name}` {value.word}"
+    needs = f"`{by}` needs `{name}`" + (" to be false" if value is Truth.FALSE else "")
+    nothing = (
+        f"no action makes `{name}` {value.word}" if by is None else f"{needs}, and no action makes it so"
+    )
+    if None not in fact.row and reached.can_be(Truth.UNKNOWN, fact.predicate, _numbers(fact)):
+        return f"{nothing} once it is unknown"
+    if value is Truth.FALSE:
+        return nothing
+    return f"{nothing}, nor does `:init` give it{_meant(reached, fact)}"
+
+
+def _numbers(fact: Fact) -> Row:
+    return tuple(number for number in fact.row if number is not None)
+
+
+def _meant(reached: Reach, fact: Fact) -> str:
+    """The predicate that may be meant, if there is just one: given, of the same arguments, and never read."""
+    model = reached.usage.model
+    read = {atom.predicate for formula in _conditions(model) for atom in mf.atoms(formula)}
+    wanted = [parameter.types for parameter in model.predicates[fact.predicate].parameters]
+    names = [
+        name
+        for name, predicate in model.predicates.items()
+        if name not in read
+        and (predicate.inferred or [parameter.types for parameter in predicate.parameters] == wanted)
+        and len(predicate.parameters) == len(wanted)
+        and (Truth.TRUE in reached.usage.set_values.get(name, ()) or name in reached.usage.start.true)
+    ]
+    return f" (is `{names[0]}` meant? nothing reads it)" if len(names) == 1 else ""
+
+
+def _conditions(model: md.Model) -> Iterator[mf.Formula]:
+    for schema in model.schemas.values():
+        yield schema.precondition
+        yield from me.conditions(schema.effect)
+    yield from (rule.condition for rule in model.rules)
+    if model.goal is not None:
+        yield model.goal
+    bodies = [template.body for template in model.templates.values()]
+    for body in bodies:  # grows while it is read
+        match body:
+            case md.BodyCondition(condition):
+                yield condition
+            case md.BodyControl(_, children):
+                bodies.extend(children)
+            case md.BodyForeach(_, child):
+                bodies.append(child)
+            case md.BodyCall():
+                pass
+            case _:
+                assert_never(body)
+
+
+def _args(model: md.Model, universe: Universe, fact: Fact) -> tuple[str, ...]:
+    declared = model.predicates[fact.predicate].parameters
+    return tuple(
+        parameter.name if number is None else universe.names[number]
+        for number, parameter in zip(fact.row, declared, strict=True)
+    )
+
+
+def _name(model: md.Model, universe: Universe, fact: Fact) -> str:
+    return ground_name(fact.predicate, _args(model, universe, fact))
+
+
+def _all_written(model: md.Model, universe: Universe, facts: Sequence[Lack]) -> str:
+    return " ".join(_written(model, universe, fact) for fact in facts if isinstance(fact, Fact))
+
+
+def _written(model: md.Model, universe: Universe, fact: Fact) -> str:
+    """The fact as ``:init`` says it."""
+    atom = f"({' '.join((fact.predicate, *_args(model, universe, fact)))})"
+    match fact.value:
+        case Truth.TRUE:
+            return atom
+        case Truth.FALSE:
+            return f"(not {atom})"
+        case Truth.UNKNOWN:
+            return f"(unknown {atom})"
+        case _:
+            assert_never(fact.value)

@@ -77,8 +77,8 @@ def _goal(model: md.Model, atoms: Atoms, report: Report, limits: Limits) -> Cond
     lowering = Lowering(atoms, limits)
     parts = []
     for part in conjuncts(model.goal):
-        if lowering.ground(part, strict=True) is FALSE:
-            unreachable(model, part, report)
+        if lowering.is_never(part):
+            report.add(unreachable(model, part, atoms, limits))
         else:
             parts.append(lowering.ground(part))
     report.raise_errors()

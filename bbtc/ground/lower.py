@@ -146,6 +146,10 @@ class Lowering:
         frame = Frame(self.universe, ())
         return self.condition(formula, frame, strict=strict)(frame.env(()))
 
+    def is_never(self, formula: mf.Formula) -> bool:
+        """Whether a condition without free parameters is true in no state, even if nothing is ever undone."""
+        return self.ground(formula, strict=True) is FALSE
+
     def normal(self, formula: mf.Formula, frame: Frame, *, strict: bool) -> Lowered:
         """:meth:`condition` of a formula in normal form."""
         match formula:

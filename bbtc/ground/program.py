@@ -129,7 +129,7 @@ class ProgramBuilder:
         parameters, block = schema.parameters, self.usage.blocks[schema.name]
         self._bound(block, self._count(parameters))
         precondition = list(conjuncts(normal_form(schema.precondition)))
-        found = list(_all_groups(block))
+        found = list(all_groups(block))
         kept = schema.name in self._called
         if not kept and len(found) == 1 and not found[0].parameters:
             # Nothing happens where the only guard is false: it may as well be a precondition.
@@ -409,7 +409,7 @@ class ProgramBuilder:
         self._rules.append(f"{head} :- {', '.join(body)}." if body else f"{head}.")
 
 
-def _all_groups(
+def all_groups(
     block: Block, around: tuple[Parameter, ...] = (), guard: tuple[mf.Formula, ...] = ()
 ) -> Iterator[Group]:
     """The groups of a block and of all branches of its chances, each with what stands around it."""
@@ -417,7 +417,7 @@ def _all_groups(
         yield Group(around + group.parameters, guard + group.guard, group.leaves)
     for chance in block.chances:
         for _, branch in chance.branches:
-            yield from _all_groups(branch, around + chance.parameters, guard + chance.guard)
+            yield from all_groups(branch, around + chance.parameters, guard + chance.guard)
 
 
 def _shows(leaf: me.Set | me.Add) -> bool:

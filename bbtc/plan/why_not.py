@@ -1,9 +1,9 @@
-"""Why a target is out of reach: where the runs of the best tree end, which action led there, and
-which conditions nothing can bring about from there."""
+"""Why the goal is out of reach: where the runs of the best tree end, which action led there, and which facts
+nothing brings back from there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TypeAlias
@@ -16,6 +16,7 @@ from bbtc.belief.state import Values
 from bbtc.belief.tick import Status
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts
 from bbtc.ground.describe import describe
+from bbtc.ground.repair import Every, Need, Repairs, Root, Some, Way, every, some
 from bbtc.ground.task import Effect, GroundAction, Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -26,14 +27,16 @@ from bbtc.tree.nodes import Tree
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A fact that no action at all brings about: ``fact`` would have to have ``value``, but is ``now``
-    something else. ``action`` (None: the goal itself) needs it, and stands at ``span``."""
+    """A fact that nothing brings back: ``fact`` would have to have ``value``, but is ``now`` something else.
+    ``action`` (None: the goal itself) needs it, and stands at ``span``. Without ``setters`` no action at all
+    brings it about; those could, but need it themselves on their way."""
 
     fact: str
     value: Truth
     now: Truth
     action: str | None
     span: Span | None
+    setters: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,17 +60,14 @@ def dead_ends(tree: Tree, limits: Limits) -> tuple[DeadEnd, ...]:
     task = tree.task
     chain = explore(task, tree.root, limits)
     visits = Absorption(chain).visits()
-    relaxed = RelaxedReachability(task)
+    roots = RootFinder(task, limits)
     ends = {state for state in chain.final if chain.status[state] is not Status.SUCCESS}
-    makers = _makers(task)
     found: dict[tuple[str | None, tuple[str, ...], tuple[Block, ...]], Fraction] = {}
 
     def add(action: str | None, state: int, probability: Fraction) -> None:
         values = chain.states[state].values
-        facts = relaxed.facts(values)
-        lost = [part for part in conjuncts(task.goal) or (task.goal,) if not possible(part, facts)]
-        blocks = _blocks(task, makers, lost, facts, values)
-        key = (action, tuple(describe(task, part) for part in lost), blocks)
+        lost = tuple(describe(task, part) for part in roots.lost(values))
+        key = (action, lost, roots.blocks(values))
         found[key] = found.get(key, Fraction(0)) + probability
 
     for probability, state in chain.initial:
@@ -88,59 +88,75 @@ def dead_ends(tree: Tree, limits: Limits) -> tuple[DeadEnd, ...]:
 _Fact: TypeAlias = tuple[int, Truth]
 
 
-def _makers(task: Task) -> dict[_Fact, list[tuple[GroundAction, Effect]]]:
-    """The effects that give a variable a value."""
-    found: dict[_Fact, list[tuple[GroundAction, Effect]]] = {}
-    for action in task.actions:
-        for effect in effects_of(action.factors):
-            for fact in effect.sets:
-                found.setdefault(fact, []).append((action, effect))
-    return found
+class RootFinder:
+    """Finds what nothing brings back from states of one task, by the delete relaxation."""
+
+    def __init__(self, task: Task, limits: Limits) -> None:
+        self._task = task
+        self._limits = limits
+        self._relaxed = RelaxedReachability(task)
+        self._makers: dict[_Fact, list[tuple[GroundAction, Effect]]] = {}
+        for action in task.actions:
+            for effect in effects_of(action.factors):
+                for fact in effect.sets:
+                    self._makers.setdefault(fact, []).append((action, effect))
+
+    def lost(self, values: Values) -> list[Condition]:
+        """The parts of the goal that nothing can make true from a state."""
+        facts, goal = self._relaxed.facts(values), self._task.goal
+        return [part for part in conjuncts(goal) or (goal,) if not possible(part, facts)]
+
+    def blocks(self, values: Values) -> tuple[Block, ...]:
+        """What the lost parts of the goal come from, nearest to the goal first; empty where nothing is lost,
+        or nothing would help. Raises ``LimitReached``."""
+        facts = self._relaxed.facts(values)
+
+        def ways(fact: _Fact) -> Iterator[Way[_Fact]]:
+            for action, effect in self._makers.get(fact, ()):
+                when = None if effect.when is None else _lacking(effect.when, facts)
+                need = every([_lacking(action.precondition, facts), when])
+                assert need is not None, "else the fact would be possible"
+                if not self._forgets_first(need, fact[0]):
+                    yield Way(action.name, need)
+
+        repairs: Repairs[_Fact] = Repairs(ways, lambda _: 1.0, self._limits)
+        need = every(_lacking(part, facts) for part in self.lost(values))
+        return tuple(self._block(root, values) for root in repairs.roots(need))
+
+    def _forgets_first(self, need: Need[_Fact], variable: int) -> bool:
+        """Whether it takes the variable to be unknown, which nothing makes it: to find out about it is no way
+        to change it."""
+        unknown = (variable, Truth.UNKNOWN)
+        parts = need.parts if isinstance(need, Every) else (need,)
+        return unknown in parts and unknown not in self._makers
+
+    def _block(self, root: Root[_Fact], values: Values) -> Block:
+        variable, value = root.what
+        needing = None if root.by is None else self._task.action_by_name[root.by]
+        return Block(
+            describe(self._task, Is(variable, Truth.TRUE)),
+            value,
+            Truth(values[variable]),
+            root.by,
+            self._task.goal_span if needing is None else needing.span,
+            root.setters,
+        )
 
 
-def _blocks(
-    task: Task,
-    makers: dict[_Fact, list[tuple[GroundAction, Effect]]],
-    lost: Iterable[Condition],
-    facts: Facts,
-    values: Values,
-) -> tuple[Block, ...]:
-    """Down from conditions that nothing can make true, through the preconditions of the actions that
-    would, the facts that no action brings about."""
-    found: dict[_Fact, Block] = {}
-    seen: set[_Fact] = set()
-    todo: list[tuple[_Fact, GroundAction | None]] = [
-        (fact, None) for part in lost for fact in _impossible(part, facts)
-    ]
-    for fact, needing in todo:  # grows while it is read: breadth first
-        if fact in seen:
-            continue
-        seen.add(fact)
-        variable, value = fact
-        if fact not in makers:
-            name, span = (None, task.goal_span) if needing is None else (needing.name, needing.span)
-            text = describe(task, Is(variable, Truth.TRUE))
-            found[fact] = Block(text, value, Truth(values[variable]), name, span)
-        for action, effect in makers.get(fact, ()):
-            needs = [action.precondition, *([] if effect.when is None else [effect.when])]
-            todo.extend((each, action) for need in needs for each in _impossible(need, facts))
-    return tuple(found.values())
-
-
-def _impossible(condition: Condition, facts: Facts) -> Iterator[_Fact]:
-    """The facts whose absence makes a condition impossible."""
+def _lacking(condition: Condition, facts: Facts) -> Need[_Fact] | None:
+    """What a condition lacks to be possible; None if nothing."""
     if possible(condition, facts):
-        return
+        return None
     match condition:
         case Is(variable, value):
-            yield variable, value
+            return variable, value
         case Known(variable):
-            yield variable, Truth.TRUE
-            yield variable, Truth.FALSE
-        case And(parts) | Or(parts):
-            for part in parts:
-                yield from _impossible(part, facts)
+            return Some(((variable, Truth.TRUE), (variable, Truth.FALSE)))
+        case And(parts):
+            return every(_lacking(part, facts) for part in parts)
+        case Or(parts):
+            return some(_lacking(part, facts) for part in parts)
         case Not(_) | Constant(_):
-            return
+            return Some(())
         case _:
             assert_never(condition)

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from bbtc.analysis.check import check
-from bbtc.analysis.resolve import resolve
 from bbtc.codes import CODES
 from bbtc.diagnostics import Report
+from bbtc.pipeline import check_documents
 from bbtc.source import SourceFile
 from bbtc.syntax.parser import parse
 
@@ -19,12 +18,7 @@ CASES = sorted((Path(__file__).parent / "errors").glob("*.pddl"))
 def _report(path: Path) -> Report:
     report = Report()
     document = parse(SourceFile(path.name, path.read_text("utf-8")), report)
-    found = {definition.kind: definition for definition in document.definitions}
-    model = resolve(found["domain"], found.get("problem"), report)
-    assert (model is None) == bool(report.errors)
-    if model is not None:
-        for diagnostic in check(model):
-            report.add(diagnostic)
+    check_documents([document], report)
     return report
 
 

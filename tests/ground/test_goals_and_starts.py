@@ -47,20 +47,14 @@ def _errors(init: str, goal: str, more: str = "") -> list[tuple[str, str, str | 
 
 def test_every_unreachable_part_of_the_goal_is_pointed_at() -> None:
     assert _errors("(q)", "(and (p a) (r) (not (q)))") == [
-        ("BBT0412", "(r)", "no action makes `r` true"),
-        ("BBT0412", "(not (q))", "no action makes `q` false"),
+        ("BBT0412", "(r)", "no action makes `r()` true, nor does `:init` give it"),
+        ("BBT0412", "(not (q))", "no action makes `q()` false"),
     ]
 
 
-def test_an_unreachable_goal_names_the_actions_that_could_have_helped() -> None:
-    advice = "`bbtc check` may tell which precondition is never true"
-    assert _errors("", "(p a)") == [
-        (
-            "BBT0412",
-            "(p a)",
-            f"only `set` could, but cannot apply, or not to these objects: {advice}",
-        )
-    ]
+def test_an_unreachable_goal_names_the_fact_that_is_missing_at_its_root() -> None:
+    needs = "`set` needs `q()`, and no action makes it so, nor does `:init` give it"
+    assert _errors("", "(p a)") == [("BBT0412", "(p a)", needs)]
 
 
 def test_a_goal_that_holds_already_is_a_warning() -> None:

@@ -11,4 +11,4 @@
   (:action guess :precondition (maybe) :effect (and (q) (unknown (maybe))))
   (:template lonely :body (condition (q)))
   (:constants a - t))
-(define (problem x) (:domain d) (:init (q) (unknown (maybe))) (:goal (and (p a) (not (q)))))
+(define (problem x) (:domain d) (:init (q) (unknown (maybe))) (:goal (or (p a) (not (q)))))

@@ -2,4 +2,4 @@
   (:predicates (lost) (hidden) (free) (done))
   (:action lose :effect (and (free) (unknown (lost))))
   (:action use :precondition (and (free) (lost) (hidden)) :effect (done)))
-(define (problem x) (:domain d) (:init (unknown (hidden))) (:goal (done)))
+(define (problem x) (:domain d) (:init (unknown (hidden))) (:goal (or (free) (done))))
