@@ -120,7 +120,9 @@ def _never_unknown(model: md.Model) -> Iterator[Diagnostic]:
                 "BBT0218",
                 f"`{name}` is declared three-valued, but nothing makes it unknown",
                 predicate.span,
-                f"no `(unknown ({name} …))` stands in `:init` or in an effect that can happen",
+                "nothing that its rules read is ever unknown"
+                if predicate.derived
+                else f"no `(unknown ({name} …))` stands in `:init` or in an effect that can happen",
             )
 
 

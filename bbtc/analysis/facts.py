@@ -47,6 +47,22 @@ def readings(formula: mf.Formula, negative: bool = False) -> Iterator[Reading]:
             assert_never(formula)
 
 
+def plain(formula: mf.Formula) -> Iterator[str]:
+    """Predicates whose unknown value makes the formula unknown: all but those in tests."""
+    match formula:
+        case mf.Atom(predicate):
+            yield predicate
+        case mf.Test() | mf.Equal():
+            return
+        case mf.Not(part) | mf.Quantified(_, _, part):
+            yield from plain(part)
+        case mf.And(parts) | mf.Or(parts):
+            for part in parts:
+                yield from plain(part)
+        case _:
+            assert_never(formula)
+
+
 def body_conditions(body: md.Body) -> Iterator[mf.Formula]:
     """The conditions in a template body."""
     match body:
@@ -169,8 +185,6 @@ def reached(model: md.Model) -> Reached:
             result.values[name, Truth.FALSE] = None
         if predicate.derived:
             result.values[name, Truth.FALSE] = None
-            if predicate.three_valued:
-                result.values[name, Truth.UNKNOWN] = None
     _close(model, result)
     return result
 
@@ -182,6 +196,8 @@ def _close(model: md.Model, result: Reached) -> None:
         for rule in model.rules:
             if result.possible(rule.condition):
                 result.values[rule.predicate, Truth.TRUE] = None
+            if any((name, Truth.UNKNOWN) in result.values for name in plain(rule.condition)):
+                result.values[rule.predicate, Truth.UNKNOWN] = None
         for schema in model.schemas.values():
             if schema.name in result.actions or result.possible(schema.precondition):
                 result.actions[schema.name] = None

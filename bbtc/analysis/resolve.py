@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from typing_extensions import assert_never
 
-from bbtc.analysis import bodies, formulas
+from bbtc.analysis import bodies, facts, formulas
 from bbtc.analysis.declare import declare, sections
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
@@ -255,7 +255,7 @@ def _three_valued(model: md.Model) -> dict[str, md.Predicate]:
         grown = False
         for rule in model.rules:
             if rule.predicate not in unknown and any(
-                predicate in unknown for predicate in _plain(rule.condition)
+                predicate in unknown for predicate in facts.plain(rule.condition)
             ):
                 unknown[rule.predicate] = None
                 grown = True
@@ -263,22 +263,6 @@ def _three_valued(model: md.Model) -> dict[str, md.Predicate]:
         key: replace(predicate, three_valued=key in unknown or predicate.declared_three_valued)
         for key, predicate in model.predicates.items()
     }
-
-
-def _plain(formula: mf.Formula) -> Iterator[str]:
-    """Predicates whose unknown value makes the formula unknown: all but those in tests."""
-    match formula:
-        case mf.Atom(predicate):
-            yield predicate
-        case mf.Test() | mf.Equal():
-            return
-        case mf.Not(part) | mf.Quantified(_, _, part):
-            yield from _plain(part)
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                yield from _plain(part)
-        case _:
-            assert_never(formula)
 
 
 # --- the problem -----------------------------------------------------------------------------

@@ -34,12 +34,21 @@ class Atoms:
             for name in self.model.predicates
             if name not in reach.usage.derived
         }
-        self.keys = self._sorted_variables()
-        if keep is not None:
-            self.keys = [key for key in self.keys if key in keep]
+        every = self._sorted_variables()
+        self.keys = every if keep is None else [key for key in every if key in keep]
         self.numbers: dict[str, dict[Row, int]] = {name: {} for name in self.model.predicates}
         for number, (predicate, row) in enumerate(self.keys):
             self.numbers[predicate][row] = number
+        # Without a variable a literal is constant, but that of an atom which is always unknown is
+        # neither true nor false: for what a test makes of it, it has a number beyond the variables.
+        self._always_unknown = [
+            (predicate, row)
+            for predicate, row in (every if keep is not None else ())
+            if self._possible[predicate][row] == (Truth.UNKNOWN,) and row not in self.numbers[predicate]
+        ]
+        self._beyond: dict[str, dict[Row, int]] = {}
+        for number, (predicate, row) in enumerate(self._always_unknown, len(self.keys)):
+            self._beyond.setdefault(predicate, {})[row] = number
         self._tables: dict[tuple[str, Truth | None, bool], Leaves] = {}
         self._is: dict[Truth, list[Is]] = {}
 
@@ -47,6 +56,11 @@ class Atoms:
     def pairs(self) -> dict[Truth, list[Pair]]:
         """For each value and variable, the pair that effects hold."""
         return {value: [(number, value) for number in range(len(self.keys))] for value in _VALUES}
+
+    def key(self, number: int) -> tuple[str, Row]:
+        """The atom that has a number in a leaf."""
+        size = len(self.keys)
+        return self.keys[number] if number < size else self._always_unknown[number - size]
 
     def _possible_values(self, predicate: str) -> dict[Row, tuple[Truth, ...]]:
         """The values of every atom that may be something else than false."""
@@ -91,9 +105,11 @@ class Atoms:
         """
         key = (predicate, value, strict)
         if key not in self._tables:
-            numbers = self.numbers[predicate]
+            beyond = self._beyond.get(predicate)
+            numbers = self.numbers[predicate] if beyond is None else {**self.numbers[predicate], **beyond}
             if value is not None and value not in self._is:
-                self._is[value] = [Is(number, value) for number in range(len(self.keys))]
+                count = len(self.keys) + len(self._always_unknown)
+                self._is[value] = [Is(number, value) for number in range(count)]
             leaves = (
                 (row, self._leaf(numbers.get(row), values, value, strict))
                 for row, values in self._possible[predicate].items()

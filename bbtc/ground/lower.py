@@ -494,7 +494,7 @@ class _Derived:
         """When a Kleene condition is unknown: it may be true (no part settles it), yet is not."""
         match condition:
             case Is(variable, value) if value is not Truth.UNKNOWN:
-                predicate, row = self._lowering.atoms.keys[variable]
+                predicate, row = self._lowering.atoms.key(variable)
                 leaves, other = self._lowering.atoms.leaves(predicate, Truth.UNKNOWN, strict=True)
                 return leaves.get(row, other)
             case And(parts):

@@ -232,7 +232,8 @@ class ProgramBuilder:
     def _conjunction(self, parts: Iterable[mf.Formula], context: list[str]) -> list[str] | None:
         """The context with the literals of some parts; None if they can never be true."""
         body: list[str] | None = list(context)
-        for part in parts:
+        # What is simple binds parameters that other parts are asked for.
+        for part in sorted(parts, key=lambda part: not self._is_simple(part)):
             if body is None:
                 return None
             if self._is_simple(part):

@@ -2,7 +2,7 @@
 
 It shares nothing with the package: it splits a text into parentheses and words, interprets what they say
 without naming or grounding anything first, and finds the best probability of each state by iteration. For
-small problems without templates only.
+small problems only; templates are passed over, since they change nothing that is possible.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ Change = dict[Fact, int]
 Binding = dict[str, str]
 Draws = list[tuple[Fraction, Change, Fraction]]
 """What may happen: with its probability, and what it adds to the cost."""
+_MOST_DRAWS = 1000
+_MOST_STATES = 300
 _NOTHING: Draws = [(Fraction(1), {}, Fraction(0))]
 
 
@@ -76,11 +78,14 @@ class Lifted:
     types: dict[str, set[str]] = field(default_factory=dict)
     objects: dict[str, set[str]] = field(default_factory=dict)
     functions: set[str] = field(default_factory=set)
+    predicates: dict[str, int] = field(default_factory=dict)
+    """How many arguments each declared predicate has."""
     actions: list[dict[str, Form]] = field(default_factory=list)
     rules: list[tuple[Form, dict[str, set[str]], Form]] = field(default_factory=list)
     init: list[Form] = field(default_factory=list)
     goal: Form = ""
     cost: str = "total-cost"
+    _worlds: dict[State, World] = field(default_factory=dict)
 
     @classmethod
     def of(cls, text: str) -> Lifted:
@@ -92,10 +97,12 @@ class Lifted:
                     self.types.update(typed(rest))
                 case ":constants" | ":objects":
                     self.objects.update(typed(rest))
+                case ":predicates":
+                    self.predicates.update((each[0], len(typed(each[1:]))) for each in rest)
                 case ":functions":
                     self.functions.update(function[0] for function in rest)
                 case ":action":
-                    self.actions.append(_fields(rest[1:]))
+                    self.actions.append({"name": rest[0], **_fields(rest[1:])})
                 case ":derived":
                     name, *parameters = rest[0]
                     self.rules.append(([name, *typed(parameters)], typed(parameters), rest[1]))
@@ -147,11 +154,16 @@ class Lifted:
             case ["forall" | "exists" as kind, parameters, part]:
                 every = [self.value(part, each, world) for each in self.bindings(typed(parameters), bound)]
                 return min(every, default=2) if kind == "forall" else max(every, default=0)
-            case ["unknown" | "known" as kind, part]:
-                unknown = self.value(part, bound, world) == 1
+            case ["unknown" | "known" as kind, part] if not self.is_fact(form):
+                unknown = world.get(_fact(part, bound), 0) == 1
                 return 2 if unknown == (kind == "unknown") else 0
             case _:
                 return world.get(_fact(form, bound), 0)
+
+    def is_fact(self, form: Form) -> bool:
+        """Is ``(known a)`` a fact? It is where a predicate of that name has one argument; what stands in
+        parentheses of its own is never an argument."""
+        return isinstance(form[1], str) and (form[1][0] == "?" or self.predicates.get(form[0]) == 1)
 
     def effect(self, form: Form, bound: Mapping[str, str], world: World) -> Draws:
         """What an effect may do; its conditions are read in ``world``."""
@@ -181,7 +193,7 @@ class Lifted:
                 return [(Fraction(1), {}, self.number(amount, bound) * (fluent == self.cost))]
             case ["not", part]:
                 return [(Fraction(1), {_fact(part, bound): 0}, Fraction(0))]
-            case ["unknown", part]:
+            case ["unknown", part] if not self.is_fact(form):
                 return [(Fraction(1), {_fact(part, bound): 1}, Fraction(0))]
             case _:
                 return [(Fraction(1), {_fact(form, bound): 2}, Fraction(0))]
@@ -197,18 +209,61 @@ class Lifted:
         given = (each for each in self.init if each[0] == "=")
         return next(Fraction(amount) for _, function, amount in given if _fact(function, {}) == wanted)
 
+    @cached_property
+    def strata(self) -> list[set[str]]:
+        """The predicates of rules, those first that others read under a negation or a test."""
+        level = dict.fromkeys((head[0] for head, _, _ in self.rules), 0)
+        for _ in range(len(level) * len(level)):
+            for head, _, condition in self.rules:
+                for name, growing in self.reads(condition):
+                    if name in level:
+                        level[head[0]] = max(level[head[0]], level[name] + (not growing))
+        return [{name for name in level if level[name] == each} for each in sorted({*level.values()})]
+
+    def reads(self, form: Form, growing: bool = True) -> Iterator[tuple[str, bool]]:
+        """The predicates in a condition, and whether the condition grows with them."""
+        match form:
+            case ["and" | "or", *parts]:
+                for part in parts:
+                    yield from self.reads(part, growing)
+            case ["not", part]:
+                yield from self.reads(part, not growing)
+            case ["imply", premise, conclusion]:
+                yield from self.reads(premise, not growing)
+                yield from self.reads(conclusion, growing)
+            case ["forall" | "exists", _, part]:
+                yield from self.reads(part, growing)
+            case ["unknown" | "known", part] if not self.is_fact(form):
+                yield _fact(part, {})[0], False
+            case [str(name), *_] | str(name):
+                yield name, growing
+            case _:
+                return
+
+    @cached_property
+    def instances(self) -> list[list[tuple[Fact, Form, Binding]]]:
+        """The rules of each stratum for all arguments: the fact, and the condition with its binding."""
+        return [
+            [
+                (_fact(head, bound), condition, bound)
+                for head, parameters, condition in self.rules
+                if head[0] in names
+                for bound in self.bindings(parameters, {})
+            ]
+            for names in self.strata
+        ]
+
     def derived(self, state: State) -> dict[Fact, int]:
-        """The world of a state: derived facts have the values of the least fixpoint. Rules that read a
-        negation stand behind those of what they read."""
+        """The world of a state: derived facts have the values of the least fixpoint, where all of them are
+        false at first and false < unknown < true."""
         world = dict(state)
-        for name in dict.fromkeys(head[0] for head, _, _ in self.rules):
+        for rules in self.instances:
             while True:
-                before = dict(world)
-                for head, parameters, condition in self.rules:
-                    for bound in self.bindings(parameters, {}) if head[0] == name else ():
-                        fact = _fact(head, bound)
-                        world[fact] = max(world.get(fact, 0), self.value(condition, bound, before))
-                if world == before:
+                values = [(fact, self.value(condition, bound, world)) for fact, condition, bound in rules]
+                risen = [(fact, value) for fact, value in values if value > world.get(fact, 0)]
+                for fact, value in risen:
+                    world[fact] = max(value, world.get(fact, 0))
+                if not risen:
                     break
         return world
 
@@ -227,95 +282,161 @@ class Lifted:
         return self.cost in self.functions or f"'{self.cost}'" in str(self.actions)
 
     @cached_property
-    def choices(self) -> dict[State, list[tuple[Fraction, dict[State, Fraction]]]]:
+    def moves(self) -> dict[str, Move]:
+        """Every action with arguments, by its name."""
+        return {
+            f"{action['name']}({','.join(bound.values())})": Move(
+                action.get(":precondition", []), action.get(":effect", []), bound
+            )
+            for action in self.actions
+            for bound in self.bindings(typed(action.get(":parameters", [])), {})
+        }
+
+    def after(self, move: Move, world: World, state: State) -> tuple[Fraction, dict[State, Fraction]]:
+        """What an action costs on average, and what it leads to."""
+        draws = move.draws
+        if draws is None:
+            draws = self.effect(move.effect, move.bound, world)
+            if "'when'" not in str(move.effect):
+                move.draws = draws
+        cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
+        return cost, _states((p, {**dict(state), **change}) for p, change, _ in draws)
+
+    def world(self, state: State) -> World:
+        """:meth:`derived`, remembered."""
+        if state not in self._worlds:
+            self._worlds[state] = self.derived(state)
+        return self._worlds[state]
+
+    @cached_property
+    def space(self) -> Space:
         """Every state that may be reached, with what each action that may start costs on average and
         leads to; where the goal is true, none does."""
-        found: dict[State, list[tuple[Fraction, dict[State, Fraction]]]] = {}
-        waiting = list(self.start())
-        while waiting:
-            state = waiting.pop()
-            if state in found:
-                continue
-            if len(found) > 300:
-                raise TooLarge
-            world, found[state] = self.derived(state), []
-            if self.value(self.goal, {}, world) == 2:
-                continue
-            for action in self.actions:
-                for bound in self.bindings(typed(action.get(":parameters", [])), {}):
-                    if self.value(action.get(":precondition", []), bound, world) == 2:
-                        draws = self.effect(action.get(":effect", []), bound, world)
-                        cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
-                        after = _states((p, {**dict(state), **change}) for p, change, _ in draws)
-                        found[state].append((cost, after))
-                        waiting += after
-        return found
+        start = self.start()
+        number = {state: place for place, state in enumerate(start)}
+        states, choices, goals = list(number), [], []
+        for state in states:
+            world = self.world(state)
+            own: list[tuple[Fraction, list[tuple[int, Fraction]]]] = []
+            goals.append(self.value(self.goal, {}, world) == 2)
+            choices.append(own)
+            for move in () if goals[-1] else self.moves.values():
+                if self.value(move.needs, move.bound, world) == 2:
+                    cost, found = self.after(move, world, state)
+                    for each in found:
+                        if each not in number:
+                            number[each] = len(states)
+                            states.append(each)
+                    own.append((cost, [(number[each], p) for each, p in found.items()]))
+                if len(states) > _MOST_STATES:
+                    raise TooLarge
+        return Space(goals, [(number[state], p) for state, p in start.items()], choices)
 
-    def goals(self) -> dict[State, Fraction]:
-        """1 for every state in which the goal is true, 0 for others."""
-        true = {state: self.value(self.goal, {}, self.derived(state)) == 2 for state in self.choices}
-        return {state: Fraction(value) for state, value in true.items()}
 
-    def within(self, steps: int) -> Fraction:
-        """The best probability of reaching the goal with so many actions."""
-        best = self.goals()
-        for _ in range(steps):
-            best = {
-                state: max([best[state], *(mean(after, best) for _, after in self.choices[state])])
-                for state in self.choices
-            }
-        result: Fraction = mean(self.start(), best)
-        return result
+@dataclass
+class Move:
+    """An action with arguments; its draws, if they are the same in every world."""
 
-    def best(self) -> dict[State, float]:
+    needs: Form
+    effect: Form
+    bound: Binding
+    draws: Draws | None = None
+
+
+class Space:
+    """The states by number: where the goal is true, where it starts, and what may be done."""
+
+    def __init__(
+        self,
+        goals: list[bool],
+        start: list[tuple[int, Fraction]],
+        choices: list[list[tuple[Fraction, list[tuple[int, Fraction]]]]],
+    ) -> None:
+        self.goals, self.start, self.choices = goals, start, choices
+        self._choices = [
+            [(float(cost), [(state, float(p)) for state, p in after]) for cost, after in each]
+            for each in choices
+        ]
+
+    def mean(self, values: list[Any]) -> Any:
+        """The expected value at the start."""
+        return sum(p * values[state] for state, p in self.start)
+
+    def within(self, *budgets: int) -> list[Fraction]:
+        """The best probability of reaching the goal with so many actions, for each of these numbers."""
+        best, found = [Fraction(goal) for goal in self.goals], {}
+        for steps in range(max(budgets) + 1):
+            found[steps] = Fraction(self.mean(best))
+            best = [
+                max([value, *(sum((p * best[s] for s, p in after), Fraction(0)) for _, after in choices)])
+                for value, choices in zip(best, self.choices, strict=True)
+            ]
+        return [found[steps] for steps in budgets]
+
+    @cached_property
+    def best(self) -> list[float]:
         """The best probability of ever reaching the goal from each state, to 1e-9 or so."""
-        best = {state: float(value) for state, value in self.goals().items()}
+        best = [float(goal) for goal in self.goals]
         moved = 1.0
         while moved > 1e-13:
             moved = 0.0
-            for state, choices in self.choices.items():
-                value = max([best[state], *(mean(after, best) for _, after in choices)])
-                moved, best[state] = max(moved, value - best[state]), value
+            for number, choices in enumerate(self._choices):
+                value = before = best[number]
+                for _, after in choices:
+                    found = 0.0
+                    for state, p in after:
+                        found += p * best[state]
+                    value = max(value, found)
+                moved, best[number] = max(moved, value - before), value
         return best
 
-    def least_cost(self, best: dict[State, float]) -> float | None:
+    def least_cost(self) -> float | None:
         """The least cost of reaching the goal as probably as possible, or of ending where it is out of
         reach; None where actions may cost nothing."""
-        open_ = [state for state in self.choices if best[state] > 0 and self.choices[state]]
-        if any(own <= 0 for state in open_ for own, _ in self.choices[state]):
-            return None
-        cost, moved = dict.fromkeys(self.choices, 0.0), 1.0
+        best = self.best
+        kept = []
+        for number, choices in enumerate(self._choices):
+            if best[number] > 0 and choices:
+                if any(own <= 0 for own, _ in choices):
+                    return None
+                chosen = (
+                    (own, after)
+                    for own, after in choices
+                    if sum(p * best[state] for state, p in after) > best[number] - 1e-9
+                )
+                kept.append((number, list(chosen)))
+        cost, moved = [0.0] * len(best), 1.0
         while moved > 1e-11:
             moved = 0.0
-            for state in open_:
-                value = min(
-                    float(own) + mean(after, cost)
-                    for own, after in self.choices[state]
-                    if mean(after, best) > best[state] - 1e-9
-                )
-                moved, cost[state] = max(moved, abs(value - cost[state]) / (1 + value)), value
-        return float(mean(self.start(), cost))
+            for number, choices in kept:
+                value = min(own + sum(p * cost[state] for state, p in after) for own, after in choices)
+                moved, cost[number] = max(moved, abs(value - cost[number]) / (1 + value)), value
+        return float(self.mean(cost))
 
 
 def _together(parts: Iterable[Draws]) -> Draws:
     """All of them, drawn independently; of two values for a fact the greater stays."""
     result = _NOTHING
     for part in parts:
-        if len(result) * len(part) > 2000:
+        if part == _NOTHING:
+            continue
+        if len(result) * len(part) > _MOST_DRAWS:
             raise TooLarge
-        result = _merged(
+        joined = [
             (p * q, {**one, **{fact: max(v, one.get(fact, v)) for fact, v in other.items()}}, c + d)
             for (p, one, c), (q, other, d) in product(result, part)
-        )
+        ]
+        result = joined if len(joined) == 1 else _merged(joined)
     return result
 
 
 def _merged(draws: Iterable[tuple[Fraction, Change, Fraction]]) -> Draws:
     found: dict[tuple[State, Fraction], Fraction] = {}
     for p, change, cost in draws:
-        key = frozenset(change.items()), cost
-        found[key] = found.get(key, Fraction(0)) + p
-    return [(p, dict(change), cost) for (change, cost), p in found.items() if p]
+        if p:
+            key = frozenset(change.items()), cost
+            found[key] = found[key] + p if key in found else p
+    return [(p, dict(change), cost) for (change, cost), p in found.items()]
 
 
 def _states(worlds: Iterable[tuple[Fraction, World]]) -> dict[State, Fraction]:
@@ -324,8 +445,3 @@ def _states(worlds: Iterable[tuple[Fraction, World]]) -> dict[State, Fraction]:
         state = frozenset((fact, value) for fact, value in world.items() if value)
         found[state] = found.get(state, Fraction(0)) + p
     return found
-
-
-def mean(after: Mapping[State, Fraction], values: Mapping[State, Any]) -> Any:
-    """The expected value of a state."""
-    return sum(p * values[state] for state, p in after.items())

@@ -1,4 +1,4 @@
-"""Random small domains with a problem, as text: all of the language but templates and what is refused."""
+"""Random small domains with a problem, as text: all of the language but what is refused."""
 
 from __future__ import annotations
 
@@ -25,11 +25,18 @@ class _Writer:
         every = {"o1": "a", "o2": "a", "o3": "b", "o4": random.choice(["both", _EITHER])}
         self.objects = {name: kind for name, kind in every.items() if name == "o1" or random.random() < 0.6}
         self.constants = [name for name in self.objects if random.random() < 0.5]
-        self.fluents = {"p": [], "q": ["a"], "r": [random.choice(["top", _EITHER, "object"])]}
+        # A predicate may have the name of a test.
+        unary = random.choice(["q"] * 8 + ["q", "q"])
+        self.fluents = {"p": [], unary: ["a"], "r": [random.choice(["top", _EITHER, "object"])]}
         self.static = {"h": [], "fixed": ["top"]}
         self.derived = {
-            name: types for name, types in {"d": ["top"], "e": []}.items() if random.random() < 0.4
+            name: types
+            for name, types in {"d": ["top"], "c": ["a"], "e": []}.items()
+            if random.random() < 0.5
         }
+        self.unary = unary
+        self.callable: dict[str, list[str]] = {}
+        self.changed: list[str] = []
         self.declared = {**self.fluents, **self.static, **self.derived}
         self.cost = random.choice(["total-cost", "fuel", ""])
 
@@ -59,19 +66,31 @@ class _Writer:
         scope = {name: self.among("a", "b", "top", "object", "both", _EITHER) for name in chosen}
         return " ".join(f"{name} - {kind}" for name, kind in scope.items()), scope
 
+    def read(self, scope: Scope, objects: list[str] | None = None) -> str:
+        """An atom that a condition reads: as often of a rule's predicate as of another."""
+        rules = bool(self.derived) and self.random.random() < 0.5
+        return self.atom(scope, self.derived if rules else self.declared, objects)
+
+    def tested(self, atom: str) -> str:
+        """A test of an atom; of one without arguments also without its parentheses."""
+        kind = self.among("unknown", "known")
+        bare = atom in {"(p)", "(h)", "(e)"} and kind != self.unary and self.random.random() < 0.2
+        return f"({kind} {atom[1:-1] if bare else atom})"
+
     def condition(
         self, scope: Scope, depth: int, names: dict[str, list[str]], objects: list[str] | None = None
     ) -> str:
         def inner(inside: Scope = scope) -> str:
             return self.condition(inside, depth - 1, names, objects)
 
-        atom = self.atom(scope, names, objects)
+        everything = names is self.declared
+        atom = self.read(scope, objects) if everything else self.atom(scope, names, objects)
         drawn = self.random.random()
         if depth <= 0 or drawn < 0.45:
             terms = self.terms(scope, "object", self.constants)
             equal = f"(= {self.random.choice(terms)} {self.random.choice(terms)})" if terms else "()"
             return self.among(
-                atom, atom, f"(not {atom})", f"( not  {atom} )", f"(unknown {atom})", f"(known {atom})", equal
+                atom, atom, f"(not {atom})", f"( not  {atom} )", self.tested(atom), self.tested(atom), equal
             )
         if drawn < 0.75:
             kind = self.among("and", "and", "or")
@@ -88,6 +107,7 @@ class _Writer:
         drawn = self.random.random()
         if depth <= 0 or drawn < 0.4:
             atom = self.atom(scope, self.fluents)
+            self.changed.append(atom)
             if self.cost and sure and drawn < 0.1:
                 fluent = self.among(self.cost, self.cost, "total-cost")
                 return f"(increase ({fluent}) {self.among(*_AMOUNTS)})"
@@ -110,33 +130,117 @@ class _Writer:
         plain = self.among(
             "()", f"(not {atom})", atom, f"(unknown {atom})", f"(and (not {atom}) (not {other}))"
         )
-        needs = self.among(plain, f"(not {other})", self.condition(scope, 2, self.declared))
+        needs = self.among(
+            *("()", plain, f"(not {other})"),
+            self.tested(self.read(scope)),
+            self.condition(scope, 2, self.declared),
+        )
         effects = " ".join(self.effect(scope, 3) for _ in range(self.random.randint(1, 3)))
         if self.cost:
             effects += f" (increase ({self.cost}) {self.among(*_AMOUNTS)})"
+        self.callable[name] = list(scope.values())
         fields = [f":parameters ({listed})", f":precondition {needs}", f":effect (and {effects})"]
         if self.random.random() < 0.2:
             self.random.shuffle(fields)
         return f"(:action {name} {' '.join(fields)})"
 
+    def growing(
+        self, scope: Scope, depth: int, names: dict[str, list[str]], again: dict[str, list[str]]
+    ) -> str:
+        """A condition that is no less true where atoms of ``again`` are truer."""
+        drawn, other = self.random.random(), self.condition(scope, 1, names)
+        if depth <= 0 or drawn < 0.3:
+            return self.atom(scope, again)
+        inner = self.growing(scope, depth - 1, names, again)
+        if drawn < 0.8:
+            return self.among(
+                f"(and {other} {inner})",
+                f"(or {other} {inner})",
+                f"(imply {other} {inner})",
+                f"(not (imply {inner} {other}))",
+            )
+        listed, more = self.parameters("?w ?z", 1)
+        inside = {**scope, **more}
+        inner = self.growing(inside, depth - 1, names, again)
+        joined = f"(and {self.condition(inside, 1, names)} {inner})"
+        return f"({self.among('exists', 'exists', 'forall')} ({listed}) {self.among(inner, joined)})"
+
     def rules(self) -> list[str]:
-        base = {**self.fluents, **self.static}
-        found = [f"(:derived (e) {self.condition({}, 2, {**base, **self.derived, 'e': []})})"]
-        found = [rule for rule in found if "e" in self.derived and "(e)" not in rule.lower()[12:]]
-        if "d" not in self.derived:
-            return found
-        scope = {"?x": "top"}
-        more = self.condition({"?w": "top", **scope}, 1, base)
-        again = f"(exists (?w - {self.among('a', 'top')}) (and (d ?w) {more}))"
-        body = self.among(again, self.condition(scope, 2, base))
-        heads = f"(:derived (d ?x - {self.among('a', 'top')}) {body})"
-        axiom = f"(:axiom :vars (?x - top) :context {self.condition(scope, 1, base)} :implies (d ?x))"
-        return [heads, *([axiom] if self.random.random() < 0.5 else []), *found]
+        """Rules over facts and over the predicates of earlier rules, however these are read; some are
+        recursive, by themselves or through each other."""
+        found: list[str] = []
+        below = {**self.fluents, **self.static}
+        waiting = list(self.derived)
+        while waiting:
+            size = 2 if self.random.random() < 0.3 else 1
+            group = {name: self.derived[name] for name in waiting[:size]}
+            waiting = waiting[size:]
+            recursive = self.random.random() < 0.5
+            for name, types in group.items():
+                for _ in range(self.random.choice([1, 1, 2])):
+                    kinds = [self.among(kind, "a", "both") if kind == "top" else kind for kind in types]
+                    scope = {f"?{name}{place}": kind for place, kind in enumerate(kinds)}
+                    plain = self.atom(scope, self.random.choice([below, self.static]))
+                    body = self.among(plain, f"(not {plain})", *[self.condition(scope, 2, below)] * 2)
+                    if recursive:
+                        body = self.among(body, self.growing(scope, 2, below, group))
+                    found.append(self.rule(name, scope, body))
+            below = {**below, **group}
+        self.random.shuffle(found)
+        return found
+
+    def rule(self, name: str, scope: Scope, body: str) -> str:
+        listed = " ".join(f"{parameter} - {kind}" for parameter, kind in scope.items())
+        if self.random.random() < 0.7:
+            return f"(:derived ({name} {listed}) {body})"
+        head = " ".join([name, *scope])
+        fitting = self.terms({}, "a", self.constants)
+        if scope and fitting and self.random.random() < 0.3:
+            head = f"{name} {self.random.choice(fitting)}"
+        return f"(:axiom :vars ({listed}) :context {body} :implies ({head}))"
+
+    # --- templates ---------------------------------------------------------------------------
+
+    def call(self, scope: Scope) -> str:
+        name, kinds = self.random.choice(list(self.callable.items()))
+        found = [self.terms(scope, kind, self.constants) for kind in kinds]
+        if not all(found):
+            return f"(condition {self.condition(scope, 1, self.declared)})"
+        return f"({' '.join([name, *map(self.random.choice, found)])})"
+
+    def body(self, scope: Scope, depth: int) -> str:
+        drawn = self.random.random()
+        if depth <= 0 or drawn < 0.35:
+            condition = f"(condition {self.condition(scope, 1, self.declared)})"
+            return self.among(self.call(scope), self.call(scope), condition)
+        inner = [self.body(scope, depth - 1) for _ in range(self.random.randint(1, 3))]
+        if drawn < 0.8:
+            return f"({self.among('sequence', 'fallback')} {' '.join(inner)})"
+        if drawn < 0.9:
+            first = f"(condition {self.condition(scope, 1, self.declared)})"
+            return f"(skipper {first} {inner[0]})"
+        kind = self.among("a", "top")
+        call = self.call({**scope, "?w": kind})
+        return f"({self.among('sequence', 'fallback')} {inner[0]} (foreach (?w - {kind}) {call}))"
+
+    def template(self, name: str) -> str:
+        listed, scope = self.parameters("?x", 1)
+        needs = self.among("()", self.condition(scope, 2, self.declared), self.tested(self.read(scope)))
+        guide = " ".join(self.effect(scope, 1, sure=False) for _ in range(self.random.randint(1, 2)))
+        text = (
+            f"(:template {name} :parameters ({listed}) :precondition {needs}"
+            f" :effect (and {guide}) :body {self.body(scope, 2)})"
+        )
+        self.callable[name] = list(scope.values())
+        return text
 
     def init(self) -> list[str]:
         names, every = {**self.fluents, **self.static}, list(self.objects)
-        facts = dict.fromkeys(self.atom({}, names, every).lower() for _ in range(self.random.randint(0, 6)))
-        found = [self.among(fact, fact, f"(unknown {fact})", f"(not {fact})") for fact in facts]
+        facts = dict.fromkeys(self.atom({}, names, every).lower() for _ in range(self.random.randint(1, 7)))
+        found = [
+            self.among(fact, fact, f"(unknown {fact})", f"(unknown {fact})", f"(not {fact})")
+            for fact in facts
+        ]
         for _ in range(self.random.choice([0, 1, 1, 2])):
             one, other = (self.atom({}, self.random.choice([names, self.static]), every) for _ in range(2))
             found.append(
@@ -144,11 +248,31 @@ class _Writer:
                     f"(probabilistic 0.3 {one})",
                     f"(probabilistic 1/4 (unknown {one}) 1/2 (and {one} {other}))",
                     f"(probabilistic 0.5 (not {one}) 0.5 (probabilistic 0.5 {other} 0.1 {one}))",
-                    "(forall (?x - a) (probabilistic 0.5 (q ?x)))",
+                    f"(forall (?x - a) (probabilistic 0.5 ({self.unary} ?x)))",
                 )
             )
+        if self.random.random() < 0.5:
+            found.append(f"(unknown {self.atom({}, self.static, every).lower()})")
+        found = [fact for place, fact in enumerate(found) if not self.contradicts(fact, found[:place])]
         self.random.shuffle(found)
         return [*found, "(= (base) 2)"]
+
+    @staticmethod
+    def contradicts(fact: str, given: list[str]) -> bool:
+        """Does a fact stand beside its like with another value?"""
+        return fact.startswith("(unknown (") and any(fact[9:-1] in other for other in given)
+
+    def within_reach(self, objects: list[str]) -> str:
+        """A fact that some action sets, perhaps, with any objects for its parameters."""
+        if not self.changed:
+            return self.atom({}, self.fluents, objects)
+        name, *args = self.random.choice(self.changed)[1:-1].split()
+        kinds = self.fluents[name.lower()]
+        found = [
+            [arg] if arg in objects else self.terms({}, kind, objects)
+            for arg, kind in zip(args, kinds, strict=True)
+        ]
+        return f"({' '.join([name, *map(self.random.choice, found)])})" if all(found) else "(p)"
 
     def text(self) -> str:
         def listed(names: list[str]) -> str:
@@ -158,10 +282,15 @@ class _Writer:
             f"({' '.join([name, *(f'?{place} - {kind}' for place, kind in enumerate(types))])})"
             for name, types in self.declared.items()
         )
+        actions = [self.action(name) for name in ["one", "two", "three"][: self.random.randint(1, 3)]]
+        count = self.random.choice([0, 0, 1, 2])
+        templates = [self.template(name) for name in ["first", "second"][:count]]
         every = list(self.objects)
-        atom, goal = self.atom({}, self.fluents, every), self.condition({}, 1, self.declared, every)
+        atom, goal = self.within_reach(every), self.condition({}, 1, self.declared, every)
         goal = self.among(
-            atom, atom, f"(unknown {atom})", f"(and {atom} {goal})", f"(and {atom} {goal})", goal
+            *(atom, atom, f"(and {atom} {goal})", f"(and {goal} {atom})", f"(or {atom} {goal})", goal),
+            *(self.tested(self.read({}, every)), f"(and {atom} {self.tested(self.read({}, every))})"),
+            self.tested(atom),
         )
         sections = [
             "(:types top - object a b - top both - (either a b))",
@@ -169,7 +298,8 @@ class _Writer:
             f"(:functions (base) {f'({self.cost})' if self.cost else ''})",
             f"(:constants {listed(self.constants)})",
             *self.rules(),
-            *(self.action(name) for name in ["one", "two", "three"][: self.random.randint(1, 3)]),
+            *actions,
+            *templates,
         ]
         metric = f"(:metric minimize ({self.cost}))" if self.cost else ""
         rest = [name for name in every if name not in self.constants]

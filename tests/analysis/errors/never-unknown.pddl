@@ -1,0 +1,12 @@
+(define (domain lamps)
+  (:requirements :unknown :derived-predicates :negative-preconditions)
+  (:predicates (dusty) (wired) (unknown (bright)) (unknown (dim)) (seen))
+  (:derived (bright) (wired))
+  (:derived (dim) (and (wired) (not (dusty))))
+  (:action wire :effect (wired))
+  (:action look :precondition (and (bright) (unknown (dim))) :effect (seen)))
+
+(define (problem evening)
+  (:domain lamps)
+  (:init (unknown (dusty)))
+  (:goal (seen)))
