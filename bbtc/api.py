@@ -224,19 +224,20 @@ def import_tree(
     file: Source,
     *task: Source,
     namespace: str = "",
+    tree: str | None = None,
     limits: Limits | None = None,
     report: Report | None = None,
 ) -> Tree:
     """The tree of an exported file, also of one that was edited, as ``bbtc import`` reads it; ``task`` is its
-    domain and problem, its compiled task, or the tree it was exported from. Where the file claims
+    domain and problem, its compiled task, or the tree it was exported from; ``tree`` is the id of the
+    BehaviorTree to read, of a file with several that nobody calls. Where the file claims
     figures that the tree does not have, a note goes to ``report``. Raises :class:`BbtcError` with
     everything that cannot be read, and :class:`LimitReached`."""
     from bbtc import pipeline
 
     (source,), others = _read([file], limits), _read(task, limits)
-    return pipeline.import_tree(
-        source, others, Report() if report is None else report, limits or Limits(), namespace
-    )
+    doubts = Report() if report is None else report
+    return pipeline.import_tree(source, others, doubts, limits or Limits(), namespace, main=tree)
 
 
 def export(

@@ -106,6 +106,9 @@ CODES: dict[str, str] = {
     "BBT0615": "not a BehaviorTree.CPP file",
     "BBT0616": "node that a tree has no counterpart for",
     "BBT0617": "notes that cannot be read",
+    "BBT0618": "BehaviorTrees that nobody calls",
+    "BBT0619": "which BehaviorTree to read is not clear",
+    "BBT0620": "file that ticks without end where the tree fails",
     # 07xx: exports
     "BBT0701": "unknown export format",
     "BBT0702": "two exporters claim one format",

@@ -21,6 +21,7 @@ from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import Status, Tree
 
 if TYPE_CHECKING:
+    from bbtc.artefacts.btcpp_xml import Imported
     from bbtc.belief.chain import Chain
     from bbtc.belief.simulate import Figures
     from bbtc.comparison import Comparison
@@ -227,29 +228,36 @@ def import_tree(
     report: Report,
     limits: Limits,
     namespace: str = "",
+    *,
+    main: str | None = None,
 ) -> Tree:
     """The tree of an exported BehaviorTree.CPP file or of a tree artefact, by hand edited ones too. Its
     task is that of ``others``: a domain and a problem, a compiled task, or another tree; without them
-    the one a tree artefact carries. The claimed figures are those of the exact simulation; where the file
-    claimed others, a note says so.
+    the one a tree artefact carries. ``main`` names the BehaviorTree to read, of a file with several that
+    nobody calls. The claimed figures are those of the exact simulation; where the file claimed others, or
+    none, a note says so.
 
     Raises :class:`BbtcError` with everything that cannot be read, or ``LimitReached``.
     """
     from bbtc.artefacts import load_tree
-    from bbtc.artefacts.btcpp_xml import tree_from_btcpp
+    from bbtc.artefacts.btcpp_xml import Imported, tree_from_btcpp
     from bbtc.artefacts.kinds import is_artefact, is_xml
 
     if not is_xml(source) and not is_artefact(source):
         load_tree(source)  # tells what it is instead
     task = _task_for_import(others, report, limits)
     if not is_xml(source):
+        if main is not None:
+            message = f"{source.name} holds one tree, which has no name"
+            raise BbtcError.single("BBT0619", message, hint="leave --tree out")
         tree = load_tree(source, task)
+        imported = Imported(tree, tree.success_probability, None)
     elif task is None:
         hint = "give its domain and problem, its compiled task, or the tree it was exported from"
         raise BbtcError.single("BBT0609", f"{source.name} carries no task", hint=hint)
     else:
-        tree = tree_from_btcpp(source, task, report, limits, namespace)
-    return _with_figures(tree, source, report, limits)
+        imported = tree_from_btcpp(source, task, report, limits, namespace=namespace, main=main)
+    return _with_figures(imported, source, report, limits)
 
 
 def _task_for_import(others: Sequence[SourceFile], report: Report, limits: Limits) -> Task | None:
@@ -263,13 +271,22 @@ def _task_for_import(others: Sequence[SourceFile], report: Report, limits: Limit
     return task_of_sources(others, report, limits)
 
 
-def _with_figures(tree: Tree, source: SourceFile, report: Report, limits: Limits) -> Tree:
+def _with_figures(imported: Imported, source: SourceFile, report: Report, limits: Limits) -> Tree:
+    tree = imported.tree
     success = simulate_tree(tree, limits)[0].success
-    if success == tree.success_probability:
+    found = figure_text(success)
+    if imported.claimed is None:
+        message = f"{source.name} claims no success probability; it is {found}"
+        report.add(Diagnostic("BBT0801", message, severity=Severity.NOTE))
+    elif imported.claimed != success:
+        message = f"{source.name} claims success probability {figure_text(imported.claimed)}; it is {found}"
+        report.add(Diagnostic("BBT0801", message, severity=Severity.NOTE))
+    if imported.told is not None and imported.told not in (imported.claimed, success):
+        told = figure_text(imported.told)
+        message = f"the description in {source.name} tells success probability {told}; it is {found}"
+        report.add(Diagnostic("BBT0801", message, severity=Severity.NOTE))
+    if success == imported.claimed:
         return tree
-    claimed, found = figure_text(tree.success_probability), figure_text(success)
-    message = f"{source.name} claims success probability {claimed}; it is {found}"
-    report.add(Diagnostic("BBT0801", message, severity=Severity.NOTE))
     if success >= tree.target:
         status: Status = "target-reached"
     else:

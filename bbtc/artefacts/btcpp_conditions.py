@@ -6,11 +6,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Generic, Protocol, TypeVar
 
-from bbtc.artefacts.btcpp_leaves import Leaves, unreadable
-from bbtc.artefacts.btcpp_patterns import has, inside_register, known_test, tag_of
+from bbtc.artefacts.btcpp_leaves import Leaves
+from bbtc.artefacts.btcpp_patterns import KNOWN, REGISTER, UNKNOWN, Match, has, match, tag_of
+from bbtc.artefacts.btcpp_unread import Unread, unreadable
 from bbtc.artefacts.cursor import clip
 from bbtc.artefacts.xmltext import XmlDocument, XmlElement
+from bbtc.export.shape import DEEPEST_CONDITION, can_be_unknown
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Or, negation
+from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.tree.deep import Deep
 
@@ -30,82 +33,150 @@ S = TypeVar("S", bound=PortScope)
 
 
 class ConditionReader(Generic[S]):
-    """Reads conditions; ``call`` follows a SubTree, ``count`` is called for each element read."""
+    """Reads conditions; ``trees`` are the BehaviorTrees of the file, ``call`` follows a SubTree, and
+    ``count`` is called for each element read."""
 
     def __init__(
         self,
+        task: Task,
         document: XmlDocument,
         leaves: Leaves,
+        unread: Unread,
+        *,
+        trees: Mapping[str, XmlElement],
         call: Callable[[XmlElement, S], tuple[XmlElement, S]],
         count: Callable[[], None],
     ) -> None:
+        self._task = task
         self._document = document
         self._leaves = leaves
+        self._unread = unread
         self._call = call
+        self._trees = trees
         self._count = count
+        self._not_conditions: set[str] | None = None
 
     def is_condition(self, element: XmlElement) -> bool:
         """Whether an element that is no sequence or fallback is written for a condition alone."""
         if has(element, "Inverter", 1) or tag_of(element) in _CONSTANTS:
             return True
-        if known_test(element) is not None:
+        if match(KNOWN, element) is not None or match(UNKNOWN, element) is not None:
             return True
         return self._leaves.is_leaf(element) and not self._leaves.is_action(element)
 
     def could_be(self, element: XmlElement) -> bool:
         """Whether all that an element holds may be one condition."""
+        if self._not_conditions is None:
+            self._not_conditions = self._trees_of_nodes()
+        called = self._called(element)
+        return called is not None and not any(name in self._not_conditions for name in called)
+
+    def _trees_of_nodes(self) -> set[str]:
+        """The BehaviorTrees that hold more than a condition, in themselves or in those that they call."""
+        callers: dict[str, list[str]] = {}
+        found: list[str] = []
+        for name, tree in self._trees.items():
+            called = self._called(tree.children[0]) if len(tree.children) == 1 else None
+            if called is None or any(other not in self._trees for other in called):
+                found.append(name)
+            for other in called or ():
+                callers.setdefault(other, []).append(name)
+        known = set(found)
+        while found:
+            for caller in callers.get(found.pop(), ()):
+                if caller not in known:
+                    known.add(caller)
+                    found.append(caller)
+        return known
+
+    def _called(self, element: XmlElement) -> list[str] | None:
+        """The BehaviorTrees that an element calls; None if it holds what is not part of a condition."""
+        called: list[str] = []
         stack = [element]
         while stack:
             part = stack.pop()
-            if inside_register(part) is not None or self.is_condition(part) or has(part, "SubTree"):
+            self._count()
+            if match(REGISTER, part) is not None or self.is_condition(part):
                 continue
-            if not (has(part, "ReactiveSequence") or has(part, "ReactiveFallback")) or not part.children:
-                return False
-            stack.extend(part.children)
-        return True
+            if has(part, "SubTree"):
+                called.append(part.attributes.get("ID", ""))
+            elif (has(part, "ReactiveSequence") or has(part, "ReactiveFallback")) and part.children:
+                stack.extend(part.children)
+            else:
+                return None
+        return called
 
-    def read(self, element: XmlElement, scope: S) -> Deep[Condition]:
-        """The condition. Raises :class:`~bbtc.artefacts.btcpp_leaves.Unreadable`."""
+    def read(
+        self, element: XmlElement, scope: S, level: int = 1, *, registered: bool = False
+    ) -> Deep[Condition]:
+        """The condition, whose parts stand on some ``level`` of a larger one, ``registered`` where its
+        result goes to the blackboard. Raises :class:`~bbtc.artefacts.btcpp_unread.Unreadable`."""
         self._count()
-        inner = inside_register(element)
-        test = known_test(element)
-        if inner is not None:
-            condition = yield self._kleene(inner, scope)
+        self._unread.took(element)
+        if level > DEEPEST_CONDITION:
+            message = f"a condition has at most {DEEPEST_CONDITION} levels"
+            raise unreadable(self._document, element, "BBT0605", message)
+        register = match(REGISTER, element)
+        test = match(KNOWN, element) or match(UNKNOWN, element)
+        if register is not None:
+            self._unread.take(register)
+            condition = yield self.read(register.part("condition"), scope, level, registered=True)
         elif test is not None:
-            known, leaf = test
-            variable = self._leaves.variable(leaf, scope.ports)
-            condition = Known(variable) if known else Is(variable, Truth.UNKNOWN)
+            condition = self._test(test, scope)
         elif has(element, "SubTree"):
-            condition = yield self.read(*self._call(element, scope))
+            condition = yield self.read(*self._call(element, scope), level)
         elif has(element, "Inverter", 1):
-            part: Condition = yield self.read(element.children[0], scope)
+            part: Condition = yield self.read(element.children[0], scope, level, registered=registered)
             condition = negation(part)
         elif tag_of(element) in _CONSTANTS and not element.children:
             condition = _CONSTANTS[tag_of(element)]
-        elif has(element, "ReactiveSequence") or has(element, "ReactiveFallback"):
-            parts = yield self._parts(element, scope)
-            condition = And(parts) if has(element, "ReactiveSequence") else Or(parts)
+        elif (kind := self._kind(element, registered=registered)) is not None:
+            condition = kind((yield self._parts(element, scope, level + 1, registered=registered)))
+            if not has(element, "Parallel"):
+                self._check_order(element, condition)
         elif self._leaves.is_leaf(element) and not element.children:
             condition = Is(self._leaves.variable(element, scope.ports), Truth.TRUE)
         else:
-            raise unreadable(
-                self._document, element, "BBT0616", f"'{clip(tag_of(element))}' is not part of a condition"
-            )
+            message = f"'{clip(tag_of(element))}' is not part of a condition"
+            raise unreadable(self._document, element, "BBT0616", message)
         result: Condition = condition
         return result
 
-    def _parts(self, element: XmlElement, scope: S) -> Deep[tuple[Condition, ...]]:
-        parts: list[Condition] = []
-        for child in element.children:
-            parts.append((yield self._kleene(child, scope)))  # noqa: PERF401
-        return tuple(parts)
+    def _test(self, test: Match, scope: S) -> Condition:
+        self._unread.take(test)
+        variable = self._leaves.variable(test.part("leaf"), scope.ports)
+        return Known(variable) if test.shape is KNOWN else Is(variable, Truth.UNKNOWN)
 
-    def _kleene(self, element: XmlElement, scope: S) -> Deep[Condition]:
-        """A condition, or a Parallel that stands for minimum or maximum."""
+    def _kind(
+        self, element: XmlElement, *, registered: bool
+    ) -> Callable[[tuple[Condition, ...]], And | Or] | None:
+        """What a control node is for conditions: the minimum, the maximum, or nothing. A Parallel remembers
+        what its parts returned, unless its result is fetched in the same tick."""
+        if has(element, "ReactiveSequence"):
+            return And
+        if has(element, "ReactiveFallback"):
+            return Or
+        if not has(element, "Parallel") or not registered or len(element.children) < 2:
+            return None
         counts = (element.attributes.get("success_count"), element.attributes.get("failure_count"))
         many = str(len(element.children))
-        if has(element, "Parallel") and counts in ((many, "1"), ("1", many)) and len(element.children) > 1:
-            parts: tuple[Condition, ...] = yield self._parts(element, scope)
-            return And(parts) if counts[1] == "1" else Or(parts)
-        condition: Condition = yield self.read(element, scope)
-        return condition
+        if counts not in ((many, "1"), ("1", many)):
+            return None
+        self._unread.took(element, "success_count", "failure_count")
+        return And if counts[1] == "1" else Or
+
+    def _parts(
+        self, element: XmlElement, scope: S, level: int, *, registered: bool
+    ) -> Deep[tuple[Condition, ...]]:
+        parts: list[Condition] = []
+        for child in element.children:
+            parts.append((yield self.read(child, scope, level, registered=registered)))  # noqa: PERF401
+        return tuple(parts)
+
+    def _check_order(self, element: XmlElement, condition: And | Or) -> None:
+        """A ReactiveSequence stops at what is unknown, where a condition would go on to what is false."""
+        for part, child in zip(condition.parts[:-1], element.children[:-1], strict=True):
+            if can_be_unknown(self._task, part):
+                message = f"what stands behind an unknown part of '{clip(tag_of(element))}' would not be read"
+                hint = "put the part that can be unknown last; if several can, export the condition anew"
+                raise unreadable(self._document, child, "BBT0616", message, hint=hint)

@@ -6,24 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+from bbtc.artefacts.btcpp_layout import is_port
 from bbtc.artefacts.btcpp_patterns import tag_of
+from bbtc.artefacts.btcpp_unread import Unread, Unreadable, unreadable
 from bbtc.artefacts.cursor import clip
 from bbtc.artefacts.xmltext import XmlDocument, XmlElement
-from bbtc.diagnostics import Diagnostic
 from bbtc.export.btcpp_names import objects_of
 from bbtc.export.interface import action_symbol, parameters_of, variable_symbol
 from bbtc.export.names import Kind, Symbol, camel, port_values, possible_identifiers
 from bbtc.ground.task import Task, ground_name
-
-NOT_PORTS = ("name", "ID")
-
-
-class Unreadable(Exception):
-    """What a tree cannot hold, and its place."""
-
-    def __init__(self, diagnostic: Diagnostic) -> None:
-        self.diagnostic = diagnostic
-        super().__init__(diagnostic.message)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,25 +26,13 @@ class FileNames:
     objects: Mapping[str, str]
 
 
-def unreadable(
-    document: XmlDocument,
-    element: XmlElement,
-    code: str,
-    message: str,
-    *,
-    attribute: str | None = None,
-    hint: str | None = None,
-) -> Unreadable:
-    """The exception for an element or one of its attributes."""
-    return Unreadable(Diagnostic(code, message, document.span(element, attribute), hint))
-
-
 class Leaves:
     """Reads leaves on a task. ``names`` are those that the file itself explains; others are taken as an
-    export would write them."""
+    export would write them; ``unread`` is told what has been read."""
 
-    def __init__(self, task: Task, document: XmlDocument, names: FileNames) -> None:
+    def __init__(self, task: Task, document: XmlDocument, names: FileNames, unread: Unread) -> None:
         self._task = task
+        self._unread = unread
         self._document = document
         self._names = names
         symbols = {variable_symbol(variable) for variable in task.variables}
@@ -97,20 +76,26 @@ class Leaves:
 
     def value(self, element: XmlElement, attribute: str, ports: Mapping[str, str]) -> str:
         """The value of an attribute, ports looked up. Raises :class:`Unreadable`."""
-        value = element.attributes[attribute]
+        value = self.resolved(element.attributes[attribute], attribute, ports)
+        if value is None:
+            message = f"the port '{clip(element.attributes[attribute])}' has no value here"
+            raise unreadable(self._document, element, "BBT0606", message, attribute=attribute)
+        return value
+
+    @staticmethod
+    def resolved(value: str, attribute: str, ports: Mapping[str, str]) -> str | None:
+        """A text as the value of an attribute, ports looked up; None for a port without a value."""
         if value == "{=}":
             value = f"{{{attribute}}}"
         if not (value.startswith("{") and value.endswith("}")):
             return value
-        if value[1:-1] not in ports:
-            message = f"the port '{clip(value[1:-1])}' has no value here"
-            raise unreadable(self._document, element, "BBT0606", message, attribute=attribute)
-        return ports[value[1:-1]]
+        return ports.get(value[1:-1])
 
     def _ground(self, element: XmlElement, ports: Mapping[str, str], kind: Kind) -> str:
         symbol = self._symbol(element, kind)
         wanted = parameters_of(self._task, symbol)
-        given = [key for key in element.attributes if key not in NOT_PORTS and not key.startswith("_")]
+        given = [key for key in element.attributes if is_port(key)]
+        self._unread.took(element, *given)
         for port in wanted:
             if port not in given:
                 message = f"'{clip(tag_of(element))}' needs the port '{port}'"

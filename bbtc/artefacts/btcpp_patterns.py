@@ -1,177 +1,371 @@
-"""The idioms of exported BehaviorTree.CPP files (:mod:`bbtc.export.btcpp_idioms`), recognised again."""
+"""The idioms of exported BehaviorTree.CPP files (:mod:`bbtc.export.btcpp_idioms`), recognised again.
+
+A shape says which elements an idiom is made of and which values their attributes have. An element with the
+elements of a shape stands for nothing else, so a value that differs is wrong, and named; an attribute that
+the shape lacks is nobody's, which :mod:`bbtc.artefacts.btcpp_unread` reports.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from typing_extensions import assert_never
 
 from bbtc.artefacts.xmltext import XmlElement
 from bbtc.export.btcpp_idioms import LATCH, SKIPPER
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
-_SET = re.compile(r"(@?\w+) := (\d+)")
-_CLEARED = re.compile(r"(@\w+) := false")
-_RAISED = re.compile(r"@\w+ := true(?:; _started := 'yes')?")
-_LEFT = re.compile(r"@?\w+ > 0(?: && @?\w+ > 0)*")
-_USED = re.compile(r"@?\w+ -= 1(?:; @?\w+ -= 1)*")
-_WORD = re.compile(r"@?[A-Za-z_]\w*")
+_COUNTER = r"@[A-Za-z_]\w*"
+_LEFT = re.compile(rf"{_COUNTER} > 0(?: && {_COUNTER} > 0)*")
+_USED = re.compile(rf"{_COUNTER} -= 1(?:; {_COUNTER} -= 1)*")
+_WORD = re.compile(_COUNTER)
+_NAME = re.compile(r"[A-Za-z_]\w*")
+_BOOLEANS = {word: value for value in (True, False) for word in (str(value), str(value).lower())}
+_BOOLEANS |= {"TRUE": True, "FALSE": False, "1": True, "0": False}
 
 
 def tag_of(element: XmlElement) -> str:
     """The id of a node; ``<Action ID="Detect"/>`` is another spelling of ``<Detect/>``."""
-    if element.tag in _KINDS and "ID" in element.attributes:
+    if is_long(element):
         return element.attributes["ID"]
     return element.tag
 
 
-def has(element: XmlElement, tag: str, children: int | None = None, **attributes: str) -> bool:
-    """Whether an element has this tag, these values, and this many children."""
-    return (
-        tag_of(element) == tag
-        and (children is None or len(element.children) == children)
-        and all(element.attributes.get(name) == value for name, value in attributes.items())
-    )
+def is_long(element: XmlElement) -> bool:
+    """Whether an element names its kind, and its id in an attribute."""
+    return element.tag in _KINDS and "ID" in element.attributes
+
+
+def has(element: XmlElement, tag: str, children: int | None = None) -> bool:
+    """Whether an element has this tag and this many children."""
+    return tag_of(element) == tag and (children is None or len(element.children) == children)
+
+
+def boolean_of(text: str) -> bool | None:
+    """The truth value that the engine reads in an attribute; None if it reads none."""
+    return _BOOLEANS.get(text)
 
 
 def is_skipper(element: XmlElement) -> bool:
     """Our node Skipper, or a Parallel that ends with the first child to end."""
-    return has(element, SKIPPER) or has(element, "Parallel", success_count="1", failure_count="1")
+    counts = (element.attributes.get("success_count"), element.attributes.get("failure_count"))
+    return has(element, SKIPPER) or (has(element, "Parallel") and counts == ("1", "1"))
 
 
-def inside_until_blocked(element: XmlElement) -> XmlElement | None:
-    """The tree in the guard against endless ticking; None if this is none."""
-    if not is_skipper(element) or len(element.children) != 2:
-        return None
-    ticked, blocked = element.children
-    if not has(ticked, "ReactiveSequence", 2) or not has(ticked.children[0], "Script"):
-        return None
-    cleared = _CLEARED.fullmatch(ticked.children[0].attributes.get("code", ""))
-    if cleared is None or not has(blocked, "Precondition", 1, **{"if": f"!{cleared.group(1)}"}):
-        return None
-    return ticked.children[1]
+# --- shapes ----------------------------------------------------------------------------------
 
 
-def retry_of(element: XmlElement) -> tuple[str, int, XmlElement] | None:
-    """Counter, attempts and child of a retry node; None if this is none."""
-    if not has(element, "ReactiveSequence", 2):
-        return None
-    once = element.children[0]
-    if not has(once, "RunOnce", 1, then_skip="false"):
-        return None
-    script = once.children[0]
-    found = _SET.fullmatch(script.attributes.get("code", "")) if has(script, "Script", 0) else None
-    if found is None or len(found.group(2)) > 6:
-        return None
-    return found.group(1), int(found.group(2)), element.children[1]
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Values of an attribute. Groups of the pattern have one text in all of a shape; ``example`` is shown to
+    a person whose value does not fit."""
+
+    pattern: re.Pattern[str]
+    example: str
+
+
+Value: TypeAlias = str | Pattern
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """Any element, with these attributes among others."""
+
+    name: str
+    attributes: Mapping[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Holes:
+    """Any number of elements, before all others."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """An element, its attributes and its children. The tag ``Skipper`` stands for a Parallel, too."""
+
+    tag: str
+    attributes: Mapping[str, Value]
+    children: tuple[Shape | Hole | Holes, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """What was found in the holes of a shape, and the texts of its groups; the elements and attributes that
+    the shape has, and those attributes that have another value, with what they should have."""
+
+    shape: Shape | None = None
+    parts: dict[str, list[XmlElement]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    read: list[tuple[XmlElement, tuple[str, ...]]] = field(default_factory=list)
+    wrong: list[tuple[XmlElement, str, str]] = field(default_factory=list)
+
+    def part(self, name: str) -> XmlElement:
+        """The element in a hole."""
+        (element,) = self.parts[name]
+        return element
+
+    def attribute(self, element: XmlElement, name: str, wanted: Value) -> None:
+        """Compare an attribute with the value it should have."""
+        value = element.attributes.get(name)
+        match wanted:
+            case str():
+                fits, example = value == wanted, wanted
+            case Pattern(pattern, example):
+                found = pattern.fullmatch(value or "")
+                groups = {} if found is None else found.groupdict()
+                fits = found is not None and all(
+                    self.texts.setdefault(group, text) == text for group, text in groups.items()
+                )
+            case _:
+                assert_never(wanted)
+        self.read.append((element, (name,)))
+        if not fits:
+            self.wrong.append((element, name, example))
+
+
+_ONE_OF = {"success_count": "1", "failure_count": "1"}
+
+
+def match(shape: Shape, element: XmlElement) -> Match | None:
+    """An element as a shape; None if it has other elements."""
+    found = Match(shape)
+    return found if _fits(shape, element, found) else None
+
+
+def _fits(shape: Shape, element: XmlElement, found: Match) -> bool:
+    attributes = shape.attributes
+    if shape.tag == SKIPPER and has(element, "Parallel"):
+        attributes = {**attributes, **_ONE_OF}
+    elif not has(element, shape.tag):
+        return False
+    children, wanted = element.children, shape.children
+    if wanted and isinstance(wanted[0], Holes) and len(children) >= len(wanted) - 1:
+        many = len(children) - len(wanted) + 1
+        found.parts[wanted[0].name] = children[:many]
+        children, wanted = children[many:], wanted[1:]
+    if len(children) != len(wanted):
+        return False
+    found.read.append((element, ()))
+    for name, value in attributes.items():
+        found.attribute(element, name, value)
+    return all(_fits_in(part, child, found) for part, child in zip(wanted, children, strict=True))
+
+
+def _fits_in(part: Shape | Hole | Holes, child: XmlElement, found: Match) -> bool:
+    match part:
+        case Shape():
+            return _fits(part, child, found)
+        case Hole(name, attributes):
+            found.parts[name] = [child]
+            for key, value in attributes.items():
+                found.attribute(child, key, value)
+            return True
+        case Holes():
+            raise ValueError("many elements stand first in a shape")
+        case _:
+            assert_never(part)
+
+
+def _script(code: Value) -> Shape:
+    return Shape("Script", {"code": code})
+
+
+def _running(script: Value, leaf: Hole) -> Shape:
+    kept = Shape("KeepRunningUntilFailure", {}, (Shape("ForceSuccess", {}, (leaf,)),))
+    return Shape("ReactiveSequence", {}, (_script(script), kept))
+
+
+_RAISED = Pattern(re.compile(rf"@(?P<flag>{_NAME.pattern}) := true"), "@acting := true")
+_RAISED_AND_STARTED = Pattern(
+    re.compile(rf"@(?P<flag>{_NAME.pattern}) := true; _started := 'yes'"),
+    "@acting := true; _started := 'yes'",
+)
+_SUCCESS, _FAILURE = Shape("AlwaysSuccess", {}), Shape("AlwaysFailure", {})
+_EVENTS = ("_onSuccess", "_onFailure", "_onHalted")
+
+UNTIL_BLOCKED = Shape(
+    SKIPPER,
+    {},
+    (
+        Shape(
+            "ReactiveSequence",
+            {},
+            (
+                _script(Pattern(re.compile(rf"@(?P<flag>{_NAME.pattern}) := false"), "@acting := false")),
+                Hole("tree"),
+            ),
+        ),
+        Shape(
+            "Precondition",
+            {"if": Pattern(re.compile(rf"!@(?P<flag>{_NAME.pattern})"), "!@acting"), "else": "RUNNING"},
+            (_FAILURE,),
+        ),
+    ),
+)
+"""The tree, and FAILURE where it is running and no action is."""
+
+RETRY = Shape(
+    "ReactiveSequence",
+    {},
+    (
+        Shape(
+            "RunOnce",
+            {"then_skip": "false"},
+            (
+                _script(
+                    Pattern(re.compile(rf"(?P<counter>{_COUNTER}) := (?P<attempts>[0-9]{{1,6}})"), "@x := 3")
+                ),
+            ),
+        ),
+        Hole("child"),
+    ),
+)
+"""A node below which every action uses up an attempt."""
+
+_LATCHED = dict(
+    zip(_EVENTS, ("_latch := 'success'", "_latch := 'failure'", "_latch := 'success'"), strict=True)
+)
+_RUN_LATCHED = _running(_RAISED, Hole("leaf", _LATCHED))
+_RUN_STARTED = _running(_RAISED_AND_STARTED, Hole("leaf", dict.fromkeys(_EVENTS, "_started := 'no'")))
+_SWITCH = {"variable": "{_latch}", "case_1": "success", "case_2": "failure"}
+_ACTIONS: tuple[tuple[Shape, str | None], ...] = (
+    (Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, _RUN_LATCHED)), "_latch"),
+    (
+        Shape(
+            "Switch2", _SWITCH, (_SUCCESS, _FAILURE, Shape("Sequence", {}, (Holes("needed"), _RUN_LATCHED)))
+        ),
+        "_latch",
+    ),
+    (_running(_RAISED, Hole("leaf")), None),
+    (
+        Shape(
+            "ReactiveSequence",
+            {},
+            (
+                Shape(
+                    "Switch2",
+                    {"variable": "{_started}", "case_1": "yes", "case_2": "never"},
+                    (_SUCCESS, _FAILURE, Hole("ready")),
+                ),
+                *_RUN_STARTED.children,
+            ),
+        ),
+        "_started",
+    ),
+)
+
+KNOWN = Shape(SKIPPER, {}, (Shape("ForceSuccess", {}, (Hole("leaf"),)), _FAILURE))
+UNKNOWN = Shape(SKIPPER, {}, (Shape("ForceFailure", {}, (Hole("leaf"),)), _SUCCESS))
+"""Tests for whether what a leaf reads is known, or unknown."""
+
+REGISTER = Shape(
+    "ReactiveSequence",
+    {},
+    (
+        Shape(
+            SKIPPER,
+            {},
+            (
+                Shape(
+                    "ForceSuccess",
+                    {},
+                    (
+                        Hole(
+                            "condition", {"_onSuccess": "_value := 'true'", "_onFailure": "_value := 'false'"}
+                        ),
+                    ),
+                ),
+                _script("_value := 'unknown'"),
+            ),
+        ),
+        Shape(
+            "Precondition",
+            {"if": "_value != 'unknown'", "else": "RUNNING"},
+            (Shape("ScriptCondition", {"code": "_value == 'true'"}),),
+        ),
+    ),
+)
+"""A Parallel whose result an entry of the blackboard holds."""
+
+
+# --- actions ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class ActionParts:
     """What an action idiom is made of: its leaf, what must be true before it starts, the counters of
-    attempts it uses, and whether it keeps its status."""
+    attempts it uses, whether it keeps its status, the flag that tells that it runs, the entry of the
+    blackboard that it remembers its state in, and how it was recognised."""
 
     leaf: XmlElement
     guards: tuple[XmlElement, ...]
     counters: tuple[str, ...]
     latched: bool
+    flag: str
+    entry: str | None
+    found: Match
 
 
 def action_of(element: XmlElement) -> ActionParts | None:
     """The parts of an action idiom; None if this is none."""
-    if has(element, LATCH):
-        if not element.children or element.attributes.get("keep", "true") not in ("true", "false", "1", "0"):
-            return None
-        keep = element.attributes.get("keep", "true") in ("true", "1")
-        return _parts(element.children[-1], element.children[:-1], keep)
-    if has(element, "Switch2", 3, variable="{_latch}", case_1="success", case_2="failure"):
-        return _latched(element.children)
-    if has(element, "ReactiveSequence", 2):
-        leaf = _running(element, ("", "", ""))
-        return None if leaf is None else ActionParts(leaf, (), (), latched=False)
-    if has(element, "ReactiveSequence", 3):
-        return _unlatched(element)
+    if has(element, LATCH) and element.children:
+        return _latch(element)
+    for shape, entry in _ACTIONS:
+        found = match(shape, element)
+        if found is None:
+            continue
+        needed: Sequence[XmlElement] = found.parts.get("needed", [])
+        if "ready" in found.parts:
+            needed = _needed(found.part("ready"), found)
+        leaf, flag = found.part("leaf"), found.texts.get("flag", "")
+        return _parts(leaf, needed, found, latched=entry == "_latch", flag=flag, entry=entry)
     return None
 
 
-def _latched(children: Sequence[XmlElement]) -> ActionParts | None:
-    if not has(children[0], "AlwaysSuccess") or not has(children[1], "AlwaysFailure"):
-        return None
-    events = ("_latch := 'success'", "_latch := 'failure'", "_latch := 'success'")
-    leaf = _running(children[2], events)
-    if leaf is not None:
-        return ActionParts(leaf, (), (), latched=True)
-    if not has(children[2], "Sequence") or not children[2].children:
-        return None
-    *needed, last = children[2].children
-    leaf = _running(last, events)
-    return None if leaf is None else _parts(leaf, needed, latched=True)
+def _latch(element: XmlElement) -> ActionParts:
+    found = Match(read=[(element, ())])
+    keep = boolean_of(element.attributes.get("keep", "true"))
+    flag = element.attributes.get("flag", "acting")
+    for name, fits, example in (
+        ("keep", keep is not None, "true"),
+        ("flag", _NAME.fullmatch(flag) is not None, "acting"),
+    ):
+        if name in element.attributes:
+            found.read.append((element, (name,)))
+            if not fits:
+                found.wrong.append((element, name, example))
+    *needed, leaf = element.children
+    return _parts(leaf, needed, found, latched=keep is not False, flag=flag, entry=None)
 
 
-def _unlatched(element: XmlElement) -> ActionParts | None:
-    ready, *rest = element.children
-    leaf = _running(XmlElement(element.tag, {}, element.start, rest), ("_started := 'no'",) * 3)
-    if leaf is None or not has(ready, "Switch2", 3, variable="{_started}", case_1="yes", case_2="never"):
-        return None
-    needed = [ready.children[2]]
-    if has(needed[0], "ReactiveSequence") and "name" not in needed[0].attributes and needed[0].children:
-        last = needed[0].children[-1]
-        if has(last, "Script") and _USED.fullmatch(last.attributes.get("code", "")):
-            needed = needed[0].children
-    return _parts(leaf, needed, latched=False)
+def _needed(ready: XmlElement, found: Match) -> Sequence[XmlElement]:
+    """What must succeed before an action starts: several nodes if the last of them uses up an attempt."""
+    if has(ready, "ReactiveSequence") and ready.children and has(ready.children[-1], "Script"):
+        found.read.append((ready, ()))
+        return ready.children
+    return [ready]
 
 
-def _running(element: XmlElement, events: tuple[str, str, str]) -> XmlElement | None:
-    """The action under what sets the flag and withholds the status."""
-    if not has(element, "ReactiveSequence", 2) or not has(element.children[0], "Script", 0):
-        return None
-    keep = element.children[1]
-    if not _RAISED.fullmatch(element.children[0].attributes.get("code", "")):
-        return None
-    if not has(keep, "KeepRunningUntilFailure", 1) or not has(keep.children[0], "ForceSuccess", 1):
-        return None
-    leaf = keep.children[0].children[0]
-    wanted = zip(("_onSuccess", "_onFailure", "_onHalted"), events, strict=True)
-    return leaf if all(leaf.attributes.get(event, "") == script for event, script in wanted) else None
-
-
-def _parts(leaf: XmlElement, needed: Sequence[XmlElement], latched: bool) -> ActionParts:
+def _parts(
+    leaf: XmlElement,
+    needed: Sequence[XmlElement],
+    found: Match,
+    *,
+    latched: bool,
+    flag: str,
+    entry: str | None,
+) -> ActionParts:
     """Splits what stands before an action into guards and the counting of attempts."""
+    guards, counters = tuple(needed), tuple[str, ...]()
     if len(needed) >= 2 and has(needed[-2], "ScriptCondition", 0) and has(needed[-1], "Script", 0):
         left, used = (part.attributes.get("code", "") for part in needed[-2:])
-        counters = _counters(left)
-        if _LEFT.fullmatch(left) and _USED.fullmatch(used) and counters == _counters(used):
-            return ActionParts(leaf, tuple(needed[:-2]), counters, latched)
-    return ActionParts(leaf, tuple(needed), (), latched)
-
-
-def _counters(script: str) -> tuple[str, ...]:
-    return tuple(_WORD.findall(script))
-
-
-def known_test(element: XmlElement) -> tuple[bool, XmlElement] | None:
-    """Whether a test asks for known (or for unknown), and the leaf it tests; None if this is none."""
-    if not is_skipper(element) or len(element.children) != 2:
-        return None
-    forced, otherwise = element.children
-    if has(forced, "ForceSuccess", 1) and has(otherwise, "AlwaysFailure", 0):
-        return True, forced.children[0]
-    if has(forced, "ForceFailure", 1) and has(otherwise, "AlwaysSuccess", 0):
-        return False, forced.children[0]
-    return None
-
-
-def inside_register(element: XmlElement) -> XmlElement | None:
-    """The Parallel whose result an entry of the blackboard holds; None if this is none."""
-    if not has(element, "ReactiveSequence", 2) or not is_skipper(element.children[0]):
-        return None
-    read, answer = element.children
-    if len(read.children) != 2 or not has(read.children[0], "ForceSuccess", 1):
-        return None
-    written = has(read.children[1], "Script", 0, code="_value := 'unknown'")
-    asked = has(answer, "Precondition", 1, **{"if": "_value != 'unknown'", "else": "RUNNING"})
-    if not written or not asked or not has(answer.children[0], "ScriptCondition", 0, code="_value == 'true'"):
-        return None
-    condition = read.children[0].children[0]
-    stored = (condition.attributes.get("_onSuccess"), condition.attributes.get("_onFailure"))
-    return condition if stored == ("_value := 'true'", "_value := 'false'") else None
+        if _LEFT.fullmatch(left) and _USED.fullmatch(used) and _WORD.findall(left) == _WORD.findall(used):
+            guards, counters = tuple(needed[:-2]), tuple(_WORD.findall(left))
+            found.read.extend((part, ("code",)) for part in needed[-2:])
+    return ActionParts(leaf, guards, counters, latched, flag, entry, found)

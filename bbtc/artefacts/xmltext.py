@@ -4,6 +4,7 @@ XML defines entities and names other files, is refused, and so is what is nested
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
@@ -26,15 +27,30 @@ class XmlElement:
 
 @dataclass(frozen=True, slots=True)
 class XmlDocument:
-    """The root element and the comments of a text."""
+    """The root element and the comments of a text; the first text in an element that is more than space,
+    by the ``id`` of the element, and the processing instructions in the root element, by offset."""
 
     source: SourceFile
     root: XmlElement
     comments: tuple[str, ...]
+    texts: Mapping[int, int] = field(default_factory=dict)
+    instructions: tuple[int, ...] = ()
 
     def span(self, element: XmlElement, attribute: str | None = None) -> Span:
         """The place of an element's tag, or of one of its attributes."""
         return _span(self.source, element.start, attribute)
+
+    def text_span(self, element: XmlElement) -> Span:
+        """The place of the text in an element: its first word."""
+        text = self.source.text
+        start = _offset(text, self.texts[id(element)])
+        word = re.compile(r"\s*(<!\[CDATA\[\s*)?([^\s<]*)").match(text, start)
+        assert word is not None
+        return Span(self.source, word.start(2), max(word.end(2), word.start(2) + 1))
+
+    def instruction_span(self, start: int) -> Span:
+        """The place of a processing instruction."""
+        return _span(self.source, start, None)
 
 
 def parse_xml(source: SourceFile) -> XmlDocument:
@@ -47,6 +63,8 @@ def parse_xml(source: SourceFile) -> XmlDocument:
     parser.StartElementHandler = lambda tag, given: reader.start(tag, given, parser.CurrentByteIndex)
     parser.EndElementHandler = reader.end
     parser.CommentHandler = reader.comments.append
+    parser.CharacterDataHandler = lambda text: reader.text(text, parser.CurrentByteIndex)
+    parser.ProcessingInstructionHandler = lambda *_: reader.instruction(parser.CurrentByteIndex)
     try:
         parser.Parse(source.text.encode(), True)
     except expat.ExpatError as error:
@@ -57,13 +75,15 @@ def parse_xml(source: SourceFile) -> XmlDocument:
             "BBT0614", f"not well-formed XML: {reason}", _span(source, start, None)
         ) from None
     assert reader.root is not None
-    return XmlDocument(source, reader.root, tuple(reader.comments))
+    return XmlDocument(source, reader.root, tuple(reader.comments), reader.texts, tuple(reader.instructions))
 
 
 class _Reader:
     def __init__(self, source: SourceFile) -> None:
         self.root: XmlElement | None = None
         self.comments: list[str] = []
+        self.texts: dict[int, int] = {}
+        self.instructions: list[int] = []
         self._source = source
         self._open: list[XmlElement] = []
 
@@ -86,10 +106,23 @@ class _Reader:
     def end(self, _tag: str) -> None:
         self._open.pop()
 
+    def text(self, text: str, offset: int) -> None:
+        if text.strip() and self._open:
+            self.texts.setdefault(id(self._open[-1]), offset)
+
+    def instruction(self, offset: int) -> None:
+        if self.root is not None:
+            self.instructions.append(offset)
+
+
+def _offset(text: str, start: int) -> int:
+    """The character at a byte of the UTF-8 form."""
+    return start if text.isascii() else len(text.encode()[:start].decode(errors="replace"))
+
 
 def _span(source: SourceFile, start: int, attribute: str | None) -> Span:
     text = source.text
-    offset = len(text.encode()[:start].decode(errors="replace"))
+    offset = _offset(text, start)
     tag = re.compile(r"<[^\s/>]*").match(text, offset)
     if tag is None:
         return Span(source, min(offset, len(text)), min(offset + 1, len(text)))

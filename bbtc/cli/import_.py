@@ -16,6 +16,9 @@ from bbtc.cli.session import command as session_command
     "--to", "form", default="json", show_default=True, metavar="FORMAT", help="What to write; see export."
 )
 @click.option("--namespace", default="", help="That of the ids in FILE, if its notes do not tell.")
+@click.option(
+    "--tree", "main", default=None, metavar="ID", help="The BehaviorTree of FILE to read; see docs/import.md."
+)
 @limit_options
 @output_options
 @session_command
@@ -25,6 +28,7 @@ def command(
     others: tuple[str, ...],
     form: str,
     namespace: str,
+    main: str | None,
     output: str,
     check: bool,
     depfile: str | None,
@@ -36,6 +40,6 @@ def command(
 
     require_place(session, form, {}, output, (file, *others), check=check, depfile=depfile)
     sources = [session.read(path) for path in (file, *others)]
-    tree = import_tree(sources[0], sources[1:], session.report, session.limits, namespace)
+    tree = import_tree(sources[0], sources[1:], session.report, session.limits, namespace, main=main)
     artefact = export_tree(tree, form, {}, session.limits)
     session.write(output, artefact, check=check, depfile=depfile)

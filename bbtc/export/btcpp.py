@@ -16,7 +16,7 @@ from typing_extensions import assert_never
 from bbtc.export.btcpp_conditions import ConditionWriter
 from bbtc.export.btcpp_idioms import SKIPPER_LABEL, Idioms, Profile
 from bbtc.export.btcpp_names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
-from bbtc.export.btcpp_notes import TEMPLATE, notes, template_label
+from bbtc.export.btcpp_notes import CLAIM, TEMPLATE, notes, template_label
 from bbtc.export.btcpp_options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.export.btcpp_palette import node_model
 from bbtc.export.interface import action_symbol, guard_of, variable_symbol
@@ -133,9 +133,7 @@ class _Writer:
     def _headline(self) -> str:
         task, claim = self.task, self.tree.success_probability
         unbounded = " Nothing bounds how often it tries." if tries_without_end(self.tree.root) else ""
-        return shown(
-            f"{task.domain}, {task.problem}: succeeds with probability {claim}.{unbounded} Made by bbtc."
-        )
+        return shown(f"{task.domain}, {task.problem}: {CLAIM}{claim}.{unbounded} Made by bbtc.")
 
     # --- nodes -------------------------------------------------------------------------------
 

@@ -36,6 +36,9 @@ MARK = " bbtc import reads here what the file cannot show:"
 TEMPLATE = "template"
 """The first word of the description of a BehaviorTree that stands for a template."""
 
+CLAIM = "succeeds with probability "
+"""What stands before the claimed figure in the description of the main tree."""
+
 VERSION = 1
 _WIDTH = 100
 

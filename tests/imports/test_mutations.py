@@ -53,7 +53,7 @@ def read(text: str, tree: Tree) -> Tree | None:
     """The tree of a file; None if it is refused, as it should be, with places and no more."""
     report = Report()
     try:
-        return tree_from_btcpp(SourceFile("t.xml", text), tree.task, report)
+        return tree_from_btcpp(SourceFile("t.xml", text), tree.task, report).tree
     except BbtcError as error:
         refusal = error
     assert refusal.diagnostics

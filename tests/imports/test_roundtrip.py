@@ -32,7 +32,7 @@ def exported(tree: Tree, **options: str | bool) -> str:
 
 def read(text: str, task: Task, namespace: str = "") -> Tree:
     report = Report()
-    tree = tree_from_btcpp(SourceFile("tree.xml", text), task, report, namespace=namespace)
+    tree = tree_from_btcpp(SourceFile("tree.xml", text), task, report, namespace=namespace).tree
     assert not list(report)
     return tree
 
