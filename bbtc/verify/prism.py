@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 
 from typing_extensions import assert_never
 
+from bbtc.rounding import digits
 from bbtc.verify.naming import Names
 from bbtc.verify.program import (
     REWARDS,
@@ -35,6 +37,10 @@ KEYWORDS = frozenset({
     "S", "sin", "smg", "stochastic", "system", "true", "U", "W", "X", "xor",
 })  # fmt: skip
 """Words that cannot be identifiers in PRISM or in Storm's reading of it."""
+BEGINNINGS = ("endmodule",)
+"""Words that no identifier may begin with: Storm takes them for the keyword, whatever follows."""
+LARGEST = 2**63 - 1
+"""The largest whole number that Storm reads as one."""
 
 
 def prism_text(program: Program, names: Names, preamble: Sequence[str] = ()) -> str:
@@ -48,8 +54,10 @@ def counted(program: Program) -> list[int]:
     """The rewards, by number, that are never negative, without the task's own where it is 0."""
     found = []
     for number, _ in enumerate(REWARDS):
-        values = [command.reward(number) for command in program.commands]
-        if min(values) >= 0 and (REWARDS[number] != "reward" or any(values)):
+        counts = REWARDS[number] != "reward" or any(
+            command.reward(number) or command.charges(number) for command in program.commands
+        )
+        if counts and all(command.least(number) >= 0 for command in program.commands):
             found.append(number)
     return found
 
@@ -86,10 +94,13 @@ class _Writer:
 
     def rewards(self, number: int) -> Iterator[str]:
         for command in self.program.commands:
-            value = command.reward(number)
-            if value:
+            parts = [_number(command.reward(number))] if command.reward(number) else []
+            for when, amount in command.charges(number).items():
+                condition = self.inner(when)
+                parts.append(_number(amount) if when == YES else f"({condition} ? {_number(amount)} : 0)")
+            if parts:
                 where = "true" if command.action is not None else self.expression(command.guard)
-                yield f"  [{self.label(command)}] {where} : {value};"
+                yield f"  [{self.label(command)}] {where} : {' + '.join(parts)};"
 
     def label(self, command: Command) -> str:
         return "" if command.action is None else self.names.actions[command.action]
@@ -105,7 +116,7 @@ class _Writer:
         last = len(command.branches) - 1
         for number, branch in enumerate(command.branches):
             sign = ";" if number == last else " +"
-            yield f"    {branch.probability} : {self.branch(branch)}{sign}"
+            yield f"    {_number(branch.probability)} : {self.branch(branch)}{sign}"
 
     def branch(self, branch: Branch) -> str:
         return " & ".join(self.update(update) for update in branch.updates) or "true"
@@ -149,6 +160,17 @@ class _Writer:
     def inner(self, expression: Expression) -> str:
         text = self.expression(expression)
         return f"({text})" if isinstance(expression, AllOf | AnyOf) else text
+
+
+def _number(value: Fraction) -> str:
+    """The number, exactly as Storm reads it too: a whole number of more than 64 bits has ``.0``."""
+    sign = "-" if value < 0 else ""
+    whole = sign + _whole(abs(value.numerator))
+    return whole if value.denominator == 1 else f"{whole}/{_whole(value.denominator)}"
+
+
+def _whole(value: int) -> str:
+    return digits(value) if value <= LARGEST else f"{digits(value)}.0"
 
 
 def _comment(remark: str) -> str:

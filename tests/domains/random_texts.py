@@ -81,21 +81,25 @@ class _Writer:
         listed, more = self.parameters("?x ?y ?z", 2)
         return f"({self.among('exists', 'forall')} ({listed}) {inner({**scope, **more})})"
 
-    def effect(self, scope: Scope, depth: int, *, sure: bool = True) -> str:
-        def inner(inside: Scope = scope, *, sure: bool = sure) -> str:
-            return self.effect(inside, depth - 1, sure=sure)
+    def increase(self) -> str:
+        fluent = self.among(self.cost, self.cost, "total-cost")
+        return f"(increase ({fluent}) {self.among(*_AMOUNTS)})"
+
+    def effect(self, scope: Scope, depth: int) -> str:
+        def inner(inside: Scope = scope) -> str:
+            return self.effect(inside, depth - 1)
 
         drawn = self.random.random()
         if depth <= 0 or drawn < 0.4:
             atom = self.atom(scope, self.fluents)
-            if self.cost and sure and drawn < 0.1:
-                fluent = self.among(self.cost, self.cost, "total-cost")
-                return f"(increase ({fluent}) {self.among(*_AMOUNTS)})"
+            if self.cost and drawn < 0.1:
+                return self.increase()
             return self.among(atom, atom, f"(not {atom})", f"(unknown {atom})")
         if drawn < 0.55:
             return f"(and {' '.join(inner() for _ in range(self.random.randint(0, 3)))})"
         if drawn < 0.68:
-            return f"(when {self.condition(scope, 1, self.declared)} {inner(sure=False)})"
+            more = self.increase() if self.cost and self.random.random() < 0.4 else ""
+            return f"(when {self.condition(scope, 1, self.declared)} (and {inner()} {more}))"
         if drawn < 0.75:
             listed, more = self.parameters("?x ?y ?z", 1)
             return f"(forall ({listed}) {inner({**scope, **more})})"
