@@ -98,8 +98,7 @@ class _Writer:
         if drawn < 0.55:
             return f"(and {' '.join(inner() for _ in range(self.random.randint(0, 3)))})"
         if drawn < 0.68:
-            more = self.increase() if self.cost and self.random.random() < 0.4 else ""
-            return f"(when {self.condition(scope, 1, self.declared)} (and {inner()} {more}))"
+            return f"(when {self.condition(scope, 1, self.declared)} {inner()})"
         if drawn < 0.75:
             listed, more = self.parameters("?x ?y ?z", 1)
             return f"(forall ({listed}) {inner({**scope, **more})})"
@@ -118,6 +117,12 @@ class _Writer:
         effects = " ".join(self.effect(scope, 3) for _ in range(self.random.randint(1, 3)))
         if self.cost:
             effects += f" (increase ({self.cost}) {self.among(*_AMOUNTS)})"
+            if self.random.random() < 0.6:
+                read = self.atom(scope, self.fluents)
+                read = self.among(read, f"(not {read})", f"(unknown {read})", self.condition(scope, 1, self.declared))
+                more = f"(when {read} (increase ({self.cost}) {self.among(*_AMOUNTS)}))"
+                perhaps = f"(probabilistic 0.5 {more} 0.3 {self.atom(scope, self.fluents)})"
+                effects += f" {self.among(more, more, perhaps)}"
         fields = [f":parameters ({listed})", f":precondition {needs}", f":effect (and {effects})"]
         if self.random.random() < 0.2:
             self.random.shuffle(fields)
