@@ -13,7 +13,7 @@ from bbtc.ground.task import Task
 from bbtc.tree.nodes import Tree
 from bbtc.verify.chain import MOST_WRITTEN, Form, chain_of
 from bbtc.verify.naming import Names
-from bbtc.verify.prism import BEGINNINGS, KEYWORDS, counted, prism_text
+from bbtc.verify.prism import END, KEYWORDS, counted, prism_text
 from bbtc.verify.process import process_of
 from bbtc.verify.program import REWARDS, Cell, Formula, Program
 
@@ -83,7 +83,7 @@ def readable_names(program: Program) -> Names:
     namer = Namer({*KEYWORDS, *REWARDS, *(label for label, _ in program.labels), "tree", "task", "here"})
 
     def take(base: str, seed: str) -> str:
-        return namer.take(f"x_{base}" if base.startswith(BEGINNINGS) else base, seed=seed)
+        return namer.take(base.replace(END, "end_module"), seed=seed)
 
     actions = sorted({command.action for command in program.commands if command.action is not None})
     return Names(

@@ -216,6 +216,14 @@ class Task:
         return {action.name: action for action in self.actions}
 
     @cached_property
+    def counts_reward(self) -> bool:
+        """Is there anything that adds to the reward, or a metric of it?"""
+        outcomes = outcomes_of(factor for action in self.actions for factor in action.factors)
+        return self.metric == "reward" or any(
+            outcome.reward or any(charge.reward for charge in outcome.charges) for outcome in outcomes
+        )
+
+    @cached_property
     def template_by_name(self) -> dict[str, GroundTemplate]:
         """Each template by its ground name."""
         return {template.name: template for template in self.templates}

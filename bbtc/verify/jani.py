@@ -80,7 +80,9 @@ def _number(value: Fraction) -> Json:
     if too_long(value):
         message = "a probability, cost or reward has too many digits for JANI"
         raise BbtcError.single("BBT0113", message, hint="prism writes it")
-    scale = next(n for n in count(1) if not (_misread(n * value.numerator) or _misread(n * value.denominator)))
+    scale = next(
+        n for n in count(1) if not (_misread(n * value.numerator) or _misread(n * value.denominator))
+    )
     if value.denominator == scale == 1:
         return value.numerator
     return {"op": "/", "left": scale * value.numerator, "right": scale * value.denominator}

@@ -25,6 +25,7 @@ from bbtc.verify.program import (
     Program,
     Update,
     Use,
+    all_of,
 )
 
 KEYWORDS = frozenset({
@@ -37,8 +38,8 @@ KEYWORDS = frozenset({
     "S", "sin", "smg", "stochastic", "system", "true", "U", "W", "X", "xor",
 })  # fmt: skip
 """Words that cannot be identifiers in PRISM or in Storm's reading of it."""
-BEGINNINGS = ("endmodule",)
-"""Words that no identifier may begin with: Storm takes them for the keyword, whatever follows."""
+END = "endmodule"
+"""The word that no identifier may hold: wherever it stands, Storm takes it for the end of the module."""
 LARGEST = 2**63 - 1
 """The largest whole number that Storm reads as one."""
 
@@ -94,13 +95,18 @@ class _Writer:
 
     def rewards(self, number: int) -> Iterator[str]:
         for command in self.program.commands:
-            parts = [_number(command.reward(number))] if command.reward(number) else []
-            for when, amount in command.charges(number).items():
-                condition = self.inner(when)
-                parts.append(_number(amount) if when == YES else f"({condition} ? {_number(amount)} : 0)")
-            if parts:
-                where = "true" if command.action is not None else self.expression(command.guard)
-                yield f"  [{self.label(command)}] {where} : {' + '.join(parts)};"
+            items = [(YES, command.reward(number)), *command.charges(number).items()]
+            where = YES if command.action is not None else command.guard
+            if all(amount >= 0 for _, amount in items):  # readers add up what stands in several lines
+                lines = [
+                    (self.expression(all_of(where, when)), _number(amount))
+                    for when, amount in items
+                    if amount
+                ]
+            else:
+                parts = (f"({self.inner(when)} ? {_number(amount)} : 0)" for when, amount in items if amount)
+                lines = [(self.expression(where), " + ".join(parts))]
+            yield from (f"  [{self.label(command)}] {holds} : {added};" for holds, added in lines)
 
     def label(self, command: Command) -> str:
         return "" if command.action is None else self.names.actions[command.action]

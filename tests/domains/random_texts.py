@@ -119,7 +119,9 @@ class _Writer:
             effects += f" (increase ({self.cost}) {self.among(*_AMOUNTS)})"
             if self.random.random() < 0.6:
                 read = self.atom(scope, self.fluents)
-                read = self.among(read, f"(not {read})", f"(unknown {read})", self.condition(scope, 1, self.declared))
+                read = self.among(
+                    read, f"(not {read})", f"(unknown {read})", self.condition(scope, 1, self.declared)
+                )
                 more = f"(when {read} (increase ({self.cost}) {self.among(*_AMOUNTS)}))"
                 perhaps = f"(probabilistic 0.5 {more} 0.3 {self.atom(scope, self.fluents)})"
                 effects += f" {self.among(more, more, perhaps)}"
