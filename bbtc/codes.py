@@ -79,7 +79,6 @@ CODES: dict[str, str] = {
     "BBT0406": "observation",
     "BBT0407": "sensor",
     "BBT0408": "recursive derived predicate",
-    "BBT0409": "conditional cost or reward",
     "BBT0410": "number without a value",
     "BBT0411": "no goal to plan for",
     "BBT0412": "goal out of reach",

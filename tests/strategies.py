@@ -14,6 +14,7 @@ from bbtc.ground.task import (
     BodyAction,
     BodyCondition,
     BodyControl,
+    Charge,
     Effect,
     Factor,
     GroundAction,
@@ -103,6 +104,10 @@ def _effect(draw: st.DrawFn, variables: tuple[Variable, ...]) -> Effect:
     return Effect(draw(conditions(variables)) if draw(_SOMETIMES) else None, tuple(sets))
 
 
+def _charge(draw: st.DrawFn, variables: tuple[Variable, ...]) -> Charge:
+    return Charge(draw(conditions(variables)), draw(_AMOUNTS), draw(_AMOUNTS))
+
+
 def _factor(draw: st.DrawFn, variables: tuple[Variable, ...], nested: int) -> Factor:
     """A chance of up to three outcomes; chance nested in chance ``nested`` times."""
     outcomes = [
@@ -112,6 +117,7 @@ def _factor(draw: st.DrawFn, variables: tuple[Variable, ...], nested: int) -> Fa
             tuple(_factor(draw, variables, nested - 1) for _ in range(draw(_FEW) if nested else 0)),
             reward=draw(_AMOUNTS),
             cost=draw(_AMOUNTS),
+            charges=tuple(_charge(draw, variables) for _ in range(draw(_SELDOM))),
         )
         for probability in draw(distributions())
     ]
@@ -119,6 +125,7 @@ def _factor(draw: st.DrawFn, variables: tuple[Variable, ...], nested: int) -> Fa
 
 
 _FEW = st.sampled_from([0, 1, 1, 2])
+_SELDOM = st.sampled_from([0, 0, 0, 1, 2])
 _SOMETIMES = st.sampled_from([False, False, True])
 _AMOUNTS = st.sampled_from([Fraction(0), Fraction(0), Fraction(1), Fraction(-1, 3)])
 _COSTS = st.sampled_from([Fraction(1), Fraction(0), Fraction(1, 3), Fraction("2.5")])

@@ -26,6 +26,7 @@ from bbtc.ground.task import (
     BodyCondition,
     BodyControl,
     BodyTemplate,
+    Charge,
     Effect,
     Factor,
     GroundAction,
@@ -127,6 +128,17 @@ def _outcome_to_json(outcome: Outcome, variables: Sequence[Variable]) -> Json:
         value["reward"] = given_text(outcome.reward)
     if outcome.cost:
         value["cost"] = given_text(outcome.cost)
+    if outcome.charges:
+        value["charges"] = [_charge_to_json(charge, variables) for charge in outcome.charges]
+    return value
+
+
+def _charge_to_json(charge: Charge, variables: Sequence[Variable]) -> Json:
+    value: Json = {"when": condition_to_json(charge.when, variables)}
+    if charge.cost:
+        value["cost"] = given_text(charge.cost)
+    if charge.reward:
+        value["reward"] = given_text(charge.reward)
     return value
 
 
@@ -369,7 +381,7 @@ class _Reader:
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:
-        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost"])
+        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges"])
         if depth > MAX_NESTING:
             raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
         return Outcome(
@@ -378,6 +390,15 @@ class _Reader:
             self.chance(at, members, depth + 1) if "factors" in members or "oneof" in members else (),
             members["reward"].given() if "reward" in members else _ZERO,
             members["cost"].given() if "cost" in members else _ZERO,
+            tuple(self._charge(element) for element in _optional(members, "charges")),
+        )
+
+    def _charge(self, at: At) -> Charge:
+        members = at.members(["when"], ["cost", "reward"])
+        return Charge(
+            self.condition(members["when"]),
+            members["cost"].given() if "cost" in members else _ZERO,
+            members["reward"].given() if "reward" in members else _ZERO,
         )
 
     def _effect(self, at: At) -> Effect:

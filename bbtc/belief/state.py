@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
 from bbtc.ground.condition import compile_condition
-from bbtc.ground.task import Effect, Factor, GroundAction, Task
+from bbtc.ground.task import Effect, Factor, GroundAction, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 
@@ -103,6 +103,7 @@ def _results(values: Values, cost: Fraction, draws: dict[_Draw, Fraction]) -> tu
 
 
 _Drawer: TypeAlias = Callable[[Values], dict[_Draw, Fraction]]
+_Amounts: TypeAlias = Callable[[Values], tuple[Fraction, Fraction]]  # cost, reward
 
 
 def _product(values: Values, drawers: Iterable[_Drawer], bounded: _Bounded) -> dict[_Draw, Fraction]:
@@ -134,8 +135,7 @@ def _compile_factor(factor: Factor, bounded: _Bounded) -> _Drawer:
     outcomes = [
         (
             o.probability,
-            o.cost,
-            o.reward,
+            _compile_amounts(o),
             _compile_effects(o.effects),
             [_compile_factor(f, bounded) for f in o.factors],
         )
@@ -144,8 +144,8 @@ def _compile_factor(factor: Factor, bounded: _Bounded) -> _Drawer:
 
     def draw(values: Values) -> dict[_Draw, Fraction]:
         drawn: dict[_Draw, Fraction] = {}
-        for probability, cost, reward, effects, nested in outcomes:
-            delta = effects(values)
+        for probability, amounts, effects, nested in outcomes:
+            delta, (cost, reward) = effects(values), amounts(values)
             product = _product(values, nested, bounded)
             for (delta2, cost2, reward2), p in product.items():
                 key = (_unite(delta, delta2), cost + cost2, reward + reward2)
@@ -154,6 +154,21 @@ def _compile_factor(factor: Factor, bounded: _Bounded) -> _Drawer:
         return drawn
 
     return draw
+
+
+def _compile_amounts(outcome: Outcome) -> _Amounts:
+    """What an outcome adds to cost and reward."""
+    certain = outcome.cost, outcome.reward
+    if not outcome.charges:
+        return lambda _values: certain
+    guarded = [(compile_condition(charge.when), charge) for charge in outcome.charges]
+
+    def amounts(values: Values) -> tuple[Fraction, Fraction]:
+        due = [charge for guard, charge in guarded if guard(values) == Truth.TRUE]
+        cost = sum((charge.cost for charge in due), certain[0])
+        return cost, sum((charge.reward for charge in due), certain[1])
+
+    return amounts
 
 
 def _compile_effects(effects: tuple[Effect, ...]) -> Callable[[Values], _Delta]:

@@ -77,5 +77,7 @@ def verdict_report(verdict: Verdict) -> list[str]:
         lines += [f"endless   {exact(own.endless)}"] if own.endless else []
         lines.append(f"cost      {expected(own.cost, own.cost_given_success)}")
         lines.append(f"actions   {expected(own.actions, own.actions_given_success)}")
+        if tree.task.counts_reward:
+            lines.append(f"reward    {expected(own.reward, None)}")
     lines.append("refused" if verdict.problems else "verified")
     return lines

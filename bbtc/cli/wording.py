@@ -132,6 +132,8 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")
     lines.append(f"cost      {expected(figures.cost, figures.cost_given_success)}")
     lines.append(f"actions   {expected(figures.actions, figures.actions_given_success)}")
+    if tree.task.counts_reward:
+        lines.append(f"reward    {expected(figures.reward, None)}")
     lines.append(f"states    {figures.states}")
     note = oneof_note(tree.task)
     if note:

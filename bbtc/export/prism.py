@@ -14,7 +14,7 @@ from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 from bbtc.verify.chain import MOST_WRITTEN, Form, chain_of
 from bbtc.verify.naming import Names
-from bbtc.verify.prism import KEYWORDS, counted, prism_text
+from bbtc.verify.prism import END, KEYWORDS, counted, prism_text
 from bbtc.verify.process import process_of
 from bbtc.verify.program import REWARDS, Cell, Formula, Program
 
@@ -81,15 +81,18 @@ def _preamble(program: Program) -> Iterator[str]:
 def readable_names(program: Program) -> Names:
     """Identifiers made of the names in the domain, by the rules of :mod:`bbtc.export.names`; two that
     would be equal, even ignoring case, are told apart by a digest."""
-    names = Namer({*KEYWORDS, *REWARDS, *(label for label, _ in program.labels), "tree", "task", "here"})
+    namer = Namer({*KEYWORDS, *REWARDS, *(label for label, _ in program.labels), "tree", "task", "here"})
+
+    def take(base: str, seed: str) -> str:
+        return namer.take(base.replace(END, "end_module"), seed=seed)
+
     actions = sorted({command.action for command in program.commands if command.action is not None})
     return Names(
-        cells=tuple(names.take(_cell(cell), seed=f"{cell.kind} {cell.subject}") for cell in program.cells),
+        cells=tuple(take(_cell(cell), f"{cell.kind} {cell.subject}") for cell in program.cells),
         formulas=tuple(
-            names.take(_formula(formula), seed=f"{formula.aspect} {formula.subject}")
-            for formula in program.formulas
+            take(_formula(formula), f"{formula.aspect} {formula.subject}") for formula in program.formulas
         ),
-        actions={action: names.take(f"do_{snake(action)}", seed=f"action {action}") for action in actions},
+        actions={action: take(f"do_{snake(action)}", f"action {action}") for action in actions},
         cell_remarks=tuple(printable(cell.meaning) for cell in program.cells),
         command_remarks=tuple(printable(command.remark) for command in program.commands),
     )

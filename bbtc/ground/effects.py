@@ -16,7 +16,7 @@ from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
 from bbtc.ground.normal import Block, Chance, free, groups, reads
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
-from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome, outcomes_of
+from bbtc.ground.task import ONE, ZERO, Charge, Effect, Factor, Outcome, outcomes_of
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
@@ -28,12 +28,33 @@ from bbtc.source import Span
 
 @dataclass(slots=True)
 class _Part:
-    """What happens at once: settings by guard, what is added, and further draws."""
+    """What happens at once: settings by guard, what is added (cost, reward), always and by guard, and
+    further draws."""
 
     sets: dict[Condition, dict[int, Truth]] = field(default_factory=dict)
     cost: Fraction = ZERO
     reward: Fraction = ZERO
+    charges: dict[Condition, tuple[Fraction, Fraction]] = field(default_factory=dict)
     factors: list[Factor] = field(default_factory=list)
+
+    def __bool__(self) -> bool:
+        """Does anything happen, further draws aside?"""
+        return bool(self.sets or self.cost or self.reward or self.charges)
+
+    def add(self, guard: Condition, cost: Fraction, reward: Fraction) -> None:
+        """Add to cost and reward where the guard is true."""
+        if guard is TRUE:
+            self.cost, self.reward = self.cost + cost, self.reward + reward
+            return
+        before = self.charges.pop(guard, (ZERO, ZERO))
+        both = before[0] + cost, before[1] + reward
+        if any(both):
+            self.charges[guard] = both
+
+    def outcome(self, probability: Fraction, factors: tuple[Factor, ...]) -> Outcome:
+        """All of it as one outcome, with further draws."""
+        charges = tuple(Charge(guard, cost, reward) for guard, (cost, reward) in self.charges.items())
+        return Outcome(probability, self.effects(), factors, self.reward, self.cost, charges)
 
     def effects(self) -> tuple[Effect, ...]:
         """The settings as effects, unconditional ones first, in order of variables."""
@@ -210,7 +231,8 @@ class LoweredEffect:
         cost, part.cost = part.cost, ZERO
         factors = _arranged(part)
         for outcome in outcomes_of(factors):
-            for number in (outcome.probability, outcome.cost, outcome.reward):
+            charged = (number for charge in outcome.charges for number in (charge.cost, charge.reward))
+            for number in (outcome.probability, outcome.cost, outcome.reward, *charged):
                 self._owner.short(number, self._span)
         return factors, self._owner.short(cost, self._span)
 
@@ -248,6 +270,16 @@ class LoweredEffect:
                         yield number, conditions
         for chance in self._chances:
             yield from chance.settings(env, above)
+
+    def charged(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
+        """The conditions under which something is added to cost or reward."""
+        if self._costs and above:
+            yield above
+        for loop, leaves in self._groups:
+            if any(isinstance(leaf, _Addition) for leaf in leaves):
+                yield from loop.guards(env, above)
+        for chance in self._chances:
+            yield from chance.charged(env, above)
 
     def part(self, env: Env, above: list[Condition]) -> _Part:
         """What happens in an environment, under the conditions above."""
@@ -304,20 +336,11 @@ class _Addition:
         return value if self._leaf.sign == 1 else self._leaf.sign * value
 
     def run(self, part: _Part, env: Env, guard: Condition) -> None:
-        """Count it where it is certain. A task has no place for one that depends on the state."""
-        leaf = self._leaf
-        if guard is not TRUE:
-            if leaf.to == "cost":
-                hint = "write one action for each case"
-                self._owner.report.error(
-                    "BBT0409", "a cost under a condition cannot be grounded", leaf.span, hint
-                )
-            else:
-                self._owner.report.warning("BBT0409", "a reward under a condition is not counted", leaf.span)
-        elif leaf.to == "cost":
-            part.cost = self._owner.short(part.cost + self.amount(env), leaf.span)
-        else:
-            part.reward = self._owner.short(part.reward + self.amount(env), leaf.span)
+        """Count it where the guard is true."""
+        leaf, amount = self._leaf, self._owner.short(self.amount(env), self._leaf.span)
+        part.add(guard, *((amount, ZERO) if leaf.to == "cost" else (ZERO, amount)))
+        for total in (part.cost, part.reward, *part.charges.get(guard, ())):
+            self._owner.short(total, leaf.span)
 
 
 _Leaf = _Setting | _Addition
@@ -337,6 +360,12 @@ class _LoweredChance:
             for _, branch in self._branches:
                 yield from branch.settings(env, conditions)
 
+    def charged(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
+        """The conditions under which some branch adds to cost or reward."""
+        for conditions in self._loop.guards(env, above):
+            for _, branch in self._branches:
+                yield from branch.charged(env, conditions)
+
     def factors(self, env: Env, above: list[Condition]) -> Iterator[Factor]:
         """One draw for every binding. A draw nested in a branch as its only one is multiplied in (a
         sum of outcomes); several, or a mixture of known and unknown probabilities, stay nested."""
@@ -349,8 +378,7 @@ class _LoweredChance:
                         joined = _join(part, inner)
                         outcomes.append(replace(joined, probability=joined.probability * probability))
                 else:
-                    nested = tuple(part.factors)
-                    outcomes.append(Outcome(probability, part.effects(), nested, part.reward, part.cost))
+                    outcomes.append(part.outcome(probability, tuple(part.factors)))
             yield Factor(merge_outcomes(outcomes), self._oneof)
 
 
@@ -425,28 +453,29 @@ def _absorb(part: _Part, outcome: Outcome) -> None:
         sets = part.sets.setdefault(TRUE if effect.when is None else effect.when, {})
         for number, value in effect.sets:
             _put(sets, number, value)
-    part.cost += outcome.cost
-    part.reward += outcome.reward
+    part.add(TRUE, outcome.cost, outcome.reward)
+    for charge in outcome.charges:
+        part.add(charge.when, charge.cost, charge.reward)
     part.factors.extend(outcome.factors)
 
 
 def _join(part: _Part, outcome: Outcome) -> Outcome:
     """The outcome with everything that is certain beside it."""
-    both = _Part({guard: dict(sets) for guard, sets in part.sets.items()}, part.cost, part.reward)
+    sets = {guard: dict(sets) for guard, sets in part.sets.items()}
+    both = _Part(sets, part.cost, part.reward, dict(part.charges))
     _absorb(both, outcome)
-    return Outcome(outcome.probability, both.effects(), tuple(both.factors), both.reward, both.cost)
+    return both.outcome(outcome.probability, tuple(both.factors))
 
 
 def _arranged(part: _Part) -> tuple[Factor, ...]:
     if len(part.factors) == 1:
         only = part.factors[0]
-        if not (part.sets or part.reward or part.cost):
+        if not part:
             return (only,)
         joined = merge_outcomes(_join(part, outcome) for outcome in only.outcomes)
         # With what is certain, all branches may come to the same.
         return (Factor(joined, only.oneof),) if len(joined) > 1 else arrange([Factor(joined)])
-    plain = Outcome(ONE, part.effects(), (), part.reward, part.cost)
-    own = (Factor((plain,)),) if part.sets or part.reward or part.cost else ()
+    own = (Factor((part.outcome(ONE, ()),)),) if part else ()
     return (*own, *part.factors)
 
 
@@ -466,7 +495,7 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     """Outcomes that do the same made one, with the sum of their probabilities."""
     merged: dict[tuple[object, ...], Outcome] = {}
     for outcome in outcomes:
-        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost)
+        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)
         before = merged.get(key)
         if before is not None:
             total = before.probability + outcome.probability

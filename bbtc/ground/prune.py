@@ -78,7 +78,7 @@ class _Relevance:
         self._read(self.task.goal)
         if self.task.metric == "reward":
             for index, action in enumerate(self.task.actions):
-                if any(outcome.reward for outcome in gt.outcomes_of(action.factors)):
+                if any(map(_earns, gt.outcomes_of(action.factors))):
                     self._keep_action(index)
         while self._fresh:
             variable = self._fresh.pop()
@@ -99,7 +99,13 @@ class _Relevance:
     def _keep_action(self, index: int) -> None:
         if index not in self.actions:
             self.actions.add(index)
-            self._read(self.task.actions[index].precondition)
+            action = self.task.actions[index]
+            self._read(action.precondition)
+            self._read_charges(action.factors)
+
+    def _read_charges(self, factors: Iterable[gt.Factor]) -> None:
+        for charge in gt.charges_of(factors):
+            self._read(charge.when)
 
     def _keep_template(self, index: int) -> None:
         todo = [index]
@@ -110,6 +116,7 @@ class _Relevance:
             self.templates.add(current)
             template = self.task.templates[current]
             self._read(template.precondition)
+            self._read_charges(template.factors)
             for part in gt.walk_body(template.body):
                 match part:
                     case gt.BodyCondition(condition):
@@ -122,6 +129,10 @@ class _Relevance:
                         pass
                     case _:
                         assert_never(part)
+
+
+def _earns(outcome: gt.Outcome) -> bool:
+    return bool(outcome.reward) or any(charge.reward for charge in outcome.charges)
 
 
 def _settings(factors: Iterable[gt.Factor]) -> Iterator[tuple[Condition | None, int]]:
@@ -178,7 +189,9 @@ class _Mapper:
                 # A guard is kept with what it guards.
                 when = None if effect.when is None else self.condition(effect.when)
                 effects.append(gt.Effect(when, sets))
-        return replace(outcome, effects=tuple(effects), factors=self.factors(outcome.factors))
+        factors = self.factors(outcome.factors)
+        charges = tuple(replace(charge, when=self.condition(charge.when)) for charge in outcome.charges)
+        return replace(outcome, effects=tuple(effects), factors=factors, charges=charges)
 
     def action(self, action: gt.GroundAction) -> gt.GroundAction:
         """The action over the kept variables."""

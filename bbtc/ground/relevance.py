@@ -40,6 +40,7 @@ class _Rows:
         self._env = frame.env
         self._keys: dict[Row, None] = {}
         self.guarded = next(me.conditions(schema.effect), None) is not None
+        self._charges = self.guarded and any(isinstance(leaf, me.Add) for leaf in me.leaves(schema.effect))
         self._conditions = lowering.reached(schema.precondition, schema.parameters)
         self._literals = _literals(lowering, schema.precondition, Frame(lowering.universe, schema.parameters))
 
@@ -73,11 +74,19 @@ class _Rows:
         return {number: None for number, _ in self._effect.settings(self._env(key), [])}
 
     def reads(self, rows: list[Row]) -> Iterator[int | None]:
-        """The variables that preconditions read (and perhaps None)."""
+        """The variables that preconditions and the conditions of costs and rewards read (and perhaps
+        None)."""
+        charged = self._charged(rows) if self._charges else ()
         if self._literals is not None:
-            return chain.from_iterable(numbers(rows) for numbers in self._literals)
+            return chain(charged, chain.from_iterable(numbers(rows) for numbers in self._literals))
         distinct = {id(condition): condition for condition in self._conditions.all(rows)}
-        return chain.from_iterable(map(variables, distinct.values()))
+        return chain(charged, chain.from_iterable(map(variables, distinct.values())))
+
+    def _charged(self, rows: list[Row]) -> Iterator[int]:
+        for key in dict.fromkeys(self.key(rows)):
+            for guard in self._effect.charged(self._env(key), []):
+                for part in guard:
+                    yield from variables(part)
 
 
 def _literals(lowering: Lowering, formula: mf.Formula, frame: Frame) -> list[Numbers] | None:

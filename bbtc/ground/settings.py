@@ -126,11 +126,11 @@ def drawn(branches: list[tuple[Fraction, list[Pairs]]], *, oneof: bool) -> list[
 
 
 def _factors(branches: list[tuple[Fraction, list[Pairs]]], *, oneof: bool) -> list[tuple[Factor, ...]]:
-    size, zeros = len(branches[0][1]), repeat(ZERO)
+    size, zeros, none = len(branches[0][1]), repeat(ZERO), repeat(())
     outcomes = []
     for probability, sets in branches:
         effects: list[tuple[Effect, ...]] = list(zip(instances(Effect, size, repeat(None), sets)))
         if not all(sets):
             effects = [made if each else () for made, each in zip(effects, sets, strict=True)]
-        outcomes.append(instances(Outcome, size, repeat(probability), effects, repeat(()), zeros, zeros))
+        outcomes.append(instances(Outcome, size, repeat(probability), effects, none, zeros, zeros, none))
     return list(zip(instances(Factor, size, zip(*outcomes, strict=True), repeat(oneof))))

@@ -60,12 +60,21 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True)
+class Charge:
+    """Adds to cost and reward where ``when`` is true in the state before the action."""
+
+    when: Condition
+    cost: Fraction
+    reward: Fraction
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """One thing that may happen, with its probability within its factor.
 
     ``factors`` are further independent choices made if this outcome happens (chance nested in
-    a branch). ``reward`` is what the outcome adds to the reward fluent. ``costs`` are what it adds
-    to the action's cost.
+    a branch). ``reward`` is what the outcome adds to the reward fluent, ``cost`` what it adds to the
+    action's cost; ``charges`` add to both under conditions.
     """
 
     probability: Fraction
@@ -73,6 +82,7 @@ class Outcome:
     factors: tuple[Factor, ...] = ()
     reward: Fraction = Fraction(0)
     cost: Fraction = Fraction(0)
+    charges: tuple[Charge, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +216,14 @@ class Task:
         return {action.name: action for action in self.actions}
 
     @cached_property
+    def counts_reward(self) -> bool:
+        """Is there anything that adds to the reward, or a metric of it?"""
+        outcomes = outcomes_of(factor for action in self.actions for factor in action.factors)
+        return self.metric == "reward" or any(
+            outcome.reward or any(charge.reward for charge in outcome.charges) for outcome in outcomes
+        )
+
+    @cached_property
     def template_by_name(self) -> dict[str, GroundTemplate]:
         """Each template by its ground name."""
         return {template.name: template for template in self.templates}
@@ -227,6 +245,11 @@ def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:
 def effects_of(factors: Iterable[Factor]) -> Iterator[Effect]:
     """Every effect that some occurrence of the factors can have."""
     return (effect for outcome in outcomes_of(factors) for effect in outcome.effects)
+
+
+def charges_of(factors: Iterable[Factor]) -> Iterator[Charge]:
+    """Every charge that some occurrence of the factors can make."""
+    return (charge for outcome in outcomes_of(factors) for charge in outcome.charges)
 
 
 def walk_body(body: Body) -> Iterator[Body]:

@@ -61,7 +61,7 @@ def best_offers(found: Reachability, limits: Limits) -> tuple[Offers, LeastCost 
     cheapest = least_cost(found, limits)
     if cheapest is not None:
         policy, best = cheapest.policy, cheapest.best
-        if any(draw.cost == 0 for draw in found.space.draws):
+        if any(found.space.draws[draw].cost == 0 for draw in np.unique(found.space.edge_draw)):
             # Among equally cheap choices, cycles without cost must not be offered.
             narrowed = replace(found, policy=policy, best=best)
             policy, best = _fewest_actions(narrowed, limits)

@@ -175,15 +175,16 @@ class Explorer:
         ends = np.cumsum(counts)
         outcomes = self.tables.first[actions][owner] + (np.arange(len(owner)) - (ends - counts)[owner])
         after = self.tables.successors(states, rows[owner], outcomes)
+        draws = self.tables.drawn(states, rows[owner], outcomes)
         if self.tables.by_reference:
-            owner, outcomes, after = self._with_reference(states, rows, actions, (owner, outcomes, after))
+            owner, draws, after = self._with_reference(states, rows, actions, (owner, draws, after))
         # A choice is kept if it may leave its state.
         moves = (after != states[rows[owner]]).any(axis=1)
         kept = np.zeros(len(rows), dtype=np.bool_)
         kept[owner[moves]] = True
         edges = kept[owner]
         self._target.add(self.table.number(after[edges]))
-        self._draw.add(outcomes[edges])
+        self._draw.add(draws[edges])
         self._edges.add(np.bincount(owner[edges], minlength=len(rows))[kept])
         self._action.add(actions[kept])
         owners = numbers[rows[kept]]
@@ -199,7 +200,7 @@ class Explorer:
     def _with_reference(
         self, states: Words, rows: Index, actions: Index, edges: tuple[Index, Index, Words]
     ) -> tuple[Index, Index, Words]:
-        """The edges (choice, outcome, state after) with those of actions that are run as the
+        """The edges (choice, draw, state after) with those of actions that are run as the
         simulator runs them."""
         owners, numbers, packed = [], [], []
         for choice in np.flatnonzero(np.isin(actions, list(self.tables.by_reference))):
@@ -209,10 +210,10 @@ class Explorer:
                 numbers.append(number)
                 packed.append(bits)
         owner = np.concatenate([edges[0], np.array(owners, dtype=np.int64)])
-        outcomes = np.concatenate([edges[1], np.array(numbers, dtype=np.int64)])
+        draws = np.concatenate([edges[1], np.array(numbers, dtype=np.int64)])
         after = np.concatenate([edges[2], self.packing.split(packed)])
         order = np.argsort(owner, kind="stable")
-        return owner[order], outcomes[order], after[order]
+        return owner[order], draws[order], after[order]
 
     def mark(self) -> int:
         """A moment in the exploration, for :meth:`since`; void once a space was made."""

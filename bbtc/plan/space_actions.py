@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from bbtc.belief.state import Transition, compile_action
 from bbtc.ground.condition import Condition
-from bbtc.ground.task import Effect, Factor, Task
+from bbtc.ground.task import Charge, Effect, Factor, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.plan.space_packing import (
@@ -45,7 +45,8 @@ class Draw:
     reward: Fraction
 
 
-_Joint: TypeAlias = tuple[frozenset[Effect], Fraction, Fraction]  # effects, cost, reward
+_Joint: TypeAlias = tuple[frozenset[Effect], Fraction, Fraction, tuple[Charge, ...]]
+"""Effects, cost, reward, and what is added to both under conditions."""
 
 
 @dataclass(slots=True)
@@ -74,7 +75,8 @@ class _Masks:
 
 @dataclass(slots=True)
 class ActionTables:
-    """All actions. ``draws`` grows when actions with very many outcomes are expanded."""
+    """All actions. ``draws`` grows when actions with very many outcomes, or with costs or rewards under
+    conditions, are expanded."""
 
     task: Task
     packing: Packing
@@ -103,6 +105,8 @@ class ActionTables:
     guard_masks: tuple[Words, Words, Words, Words] = field(init=False)
     by_reference: dict[int, Transition] = field(init=False, default_factory=dict)
     """Actions with too many joint outcomes, as the simulator runs them."""
+    _charges: dict[int, tuple[tuple[BitTest, Charge], ...]] = field(init=False, default_factory=dict)
+    """By outcome: what it adds to cost and reward under conditions."""
     _draw_index: dict[Draw, int] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -141,13 +145,16 @@ class ActionTables:
         for number, action in enumerate(self.task.actions):
             first.append(len(base))
             joint = _joint(action.factors)
-            rows = None if joint is None else [self._outcome(effects) for effects, _, _ in joint]
+            rows = None if joint is None else [self._outcome(effects) for effects, *_ in joint]
             if joint is None or rows is None or any(row is None for row in rows):
                 self.by_reference[number] = compile_action(action, self.limits)
                 count.append(0)
                 continue
-            for row, ((_, cost, reward), probability) in zip(rows, joint.items(), strict=True):
+            for row, ((_, cost, reward, charges), probability) in zip(rows, joint.items(), strict=True):
                 assert row is not None
+                if charges:
+                    tests = tuple((bit_test(self.packing, charge.when), charge) for charge in charges)
+                    self._charges[len(base)] = tests
                 base.append(row[0])
                 guards.append(row[1])
                 self.draws.append(Draw(probability, action.cost + cost, reward))
@@ -185,6 +192,34 @@ class ActionTables:
                 return None
             guarded.extend((cube, _Masks.of(self.packing, assignments)) for cube in found)
         return _Masks.of(self.packing, sets), guarded
+
+    def drawn(self, states: Words, rows: Index, outcomes: Index) -> Index:
+        """The numbers in :attr:`draws` of outcomes in the state of each row: their own, but where costs or
+        rewards depend on the state."""
+        if not self._charges:
+            return outcomes
+        numbers: Index = outcomes.copy()
+        charged = np.zeros(len(self.draws), dtype=np.bool_)
+        charged[list(self._charges)] = True
+        places = np.flatnonzero(charged[outcomes])
+        places = places[np.argsort(outcomes[places], kind="stable")]
+        starts = np.flatnonzero(np.diff(outcomes[places], prepend=-1))
+        for at in np.split(places, starts[1:]) if len(places) else ():
+            numbers[at] = self._drawn(int(outcomes[at[0]]), states[rows[at]])
+        return numbers
+
+    def _drawn(self, outcome: int, states: Words) -> Index:
+        """The numbers of the figures of one outcome in some states."""
+        tests, own = self._charges[outcome], self.draws[outcome]
+        due = np.array([holds(self.packing, test, states) for test, _ in tests])
+        kinds, kind = np.unique(due, axis=1, return_inverse=True)
+        made = []
+        for flags in kinds.T:
+            charges = [charge for flag, (_, charge) in zip(flags, tests, strict=True) if flag]
+            cost = sum((charge.cost for charge in charges), own.cost)
+            reward = sum((charge.reward for charge in charges), own.reward)
+            made.append(self.draw_number(Draw(own.probability, cost, reward)))
+        return np.array([made[each] for each in kind.reshape(-1).tolist()], dtype=np.int64)
 
     def draw_number(self, draw: Draw) -> int:
         """The number of an outcome's figures in :attr:`draws`."""
@@ -303,13 +338,13 @@ def _joint(factors: tuple[Factor, ...]) -> dict[_Joint, Fraction] | None:
             total = drawn
             continue
         combined: dict[_Joint, Fraction] = {}
-        for (effects, cost, reward), p in total.items():
-            for (effects2, cost2, reward2), p2 in drawn.items():
-                key = (effects | effects2, cost + cost2, reward + reward2)
+        for (effects, cost, reward, charges), p in total.items():
+            for (effects2, cost2, reward2, charges2), p2 in drawn.items():
+                key = (effects | effects2, cost + cost2, reward + reward2, charges + charges2)
                 combined[key] = combined.get(key, Fraction(0)) + p * p2
         total = combined
     if total is None:
-        return {(frozenset(), Fraction(0), Fraction(0)): Fraction(1)}
+        return {(frozenset(), Fraction(0), Fraction(0), ()): Fraction(1)}
     return total if len(total) <= _MOST_OUTCOMES else None
 
 
@@ -318,14 +353,14 @@ def _drawn(factor: Factor) -> dict[_Joint, Fraction] | None:
     for outcome in factor.outcomes:
         if not outcome.probability:
             continue
-        key = (frozenset(outcome.effects), outcome.cost, outcome.reward)
+        key = (frozenset(outcome.effects), outcome.cost, outcome.reward, outcome.charges)
         if not outcome.factors:
             drawn[key] = drawn[key] + outcome.probability if key in drawn else outcome.probability
             continue
         nested = _joint(outcome.factors)
         if nested is None:
             return None
-        for (effects, cost, reward), p in nested.items():
-            joined = (key[0] | effects, key[1] + cost, key[2] + reward)
+        for (effects, cost, reward, charges), p in nested.items():
+            joined = (key[0] | effects, key[1] + cost, key[2] + reward, key[3] + charges)
             drawn[joined] = drawn.get(joined, Fraction(0)) + p * outcome.probability
     return drawn

@@ -50,7 +50,7 @@ def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None
         return None
     space, graph = found.space, found.graph
     table = [draw.cost for draw in space.draws] if costs is None else costs
-    if any(cost < 0 for cost in table):
+    if any(table[draw] < 0 for draw in np.unique(space.edge_draw)):
         return None
     open_states = ~found.zero & ~space.goal
     if not open_states.any():

@@ -70,13 +70,13 @@ def explore(program: Program, limits: Limits) -> Space:
             if not guard(state):
                 continue
             steps = []
-            for branch, after_of in compiled:
+            for branch, after_of, rewards_of in compiled:
                 after = after_of(state)
                 assert all(map(int.__le__, after, highest)), "a value is out of its range"
                 target = number.setdefault(after, len(states))
                 if target == len(states):
                     states.append(after)
-                steps.append(Step(target, branch.probability, branch.rewards))
+                steps.append(Step(target, branch.probability, rewards_of(state)))
             stays = all(step.target == index for step in steps) and command.action is None
             enabled.append((command, () if stays else tuple(steps)))
         assert program.kind == "mdp" or len(enabled) == 1, f"{len(enabled)} commands are enabled"
@@ -88,9 +88,12 @@ def explore(program: Program, limits: Limits) -> Space:
 
 
 _Test: TypeAlias = Callable[[State], bool]
+_Rewards: TypeAlias = tuple[Fraction, ...]
 
 
-def _compile(reader: _Reader, branch: Branch) -> tuple[Branch, Callable[[State], State]]:
+def _compile(
+    reader: _Reader, branch: Branch
+) -> tuple[Branch, Callable[[State], State], Callable[[State], _Rewards]]:
     choosers: list[tuple[int, list[tuple[_Test, int]]]] = []
     counters: list[int] = []
     for update in branch.updates:
@@ -113,7 +116,19 @@ def _compile(reader: _Reader, branch: Branch) -> tuple[Branch, Callable[[State],
             cells[cell] = state[cell] + 1
         return tuple(cells)
 
-    return branch, after
+    return branch, after, _compile_rewards(reader, branch)
+
+
+def _compile_rewards(reader: _Reader, branch: Branch) -> Callable[[State], _Rewards]:
+    if not branch.charges:
+        return lambda _: branch.rewards
+    charges = [(reader.compile(charge.when), charge.rewards) for charge in branch.charges]
+
+    def rewards(state: State) -> _Rewards:
+        due = [added for holds, added in charges if holds(state)]
+        return tuple(sum(amounts, Fraction(0)) for amounts in zip(branch.rewards, *due, strict=True))
+
+    return rewards
 
 
 class _Reader:

@@ -4,12 +4,15 @@ https://jani-spec.org/), version 1."""
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import count
 from typing import Any, TypeAlias
 
 from typing_extensions import assert_never
 
+from bbtc.diagnostics import BbtcError
+from bbtc.rounding import too_long
 from bbtc.verify.naming import Names
-from bbtc.verify.prism import counted
+from bbtc.verify.prism import LARGEST, counted
 from bbtc.verify.program import (
     REWARDS,
     YES,
@@ -73,9 +76,21 @@ def jani_model(program: Program, names: Names) -> dict[str, Json]:
 
 
 def _number(value: Fraction) -> Json:
-    if value.denominator == 1:
-        return int(value)
-    return {"op": "/", "left": value.numerator, "right": value.denominator}
+    """The number, exactly. Raises :class:`BbtcError` for one that JSON texts have no room for."""
+    if too_long(value):
+        message = "a probability, cost or reward has too many digits for JANI"
+        raise BbtcError.single("BBT0113", message, hint="prism writes it")
+    scale = next(
+        n for n in count(1) if not (_misread(n * value.numerator) or _misread(n * value.denominator))
+    )
+    if value.denominator == scale == 1:
+        return value.numerator
+    return {"op": "/", "left": scale * value.numerator, "right": scale * value.denominator}
+
+
+def _misread(whole: int) -> bool:
+    """Does Storm take the number for a negative one? It reads what fits into 64 bits, and into 63 not, so."""
+    return LARGEST < whole <= 2 * LARGEST + 1
 
 
 class _Writer:
@@ -139,12 +154,20 @@ class _Writer:
             edge["comment"] = remark
         edge["guard"] = {"exp": self.expression(command.guard)}
         earned = [
-            {"ref": REWARDS[number], "value": _number(command.reward(number))}
+            {"ref": REWARDS[number], "value": value}
             for number in self.counted
-            if command.reward(number)
+            if (value := self.reward(command, number))
         ]
         edge["destinations"] = [self.destination(branch, earned) for branch in command.branches]
         return edge
+
+    def reward(self, command: Command, number: int) -> Json:
+        """The expectation of a reward over the branches, as an expression over the state before; 0 for none."""
+        total: Json = _number(command.reward(number))
+        for when, amount in command.charges(number).items():
+            added = {"op": "ite", "if": self.expression(when), "then": _number(amount), "else": 0}
+            total = {"op": "+", "left": total, "right": added} if total else added
+        return total
 
     def destination(self, branch: Branch, earned: list[Json]) -> Json:
         destination: dict[str, Json] = {"location": _PLACE}

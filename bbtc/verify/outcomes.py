@@ -11,15 +11,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import TypeAlias
 
 from bbtc.ground.condition import variables
-from bbtc.ground.task import Effect, Factor, GroundAction, Outcome, Task, effects_of
+from bbtc.ground.task import Charge, Effect, Factor, GroundAction, Outcome, Task, charges_of, effects_of
 from bbtc.verify.conditions import FALSE, TRUE, UNKNOWN, where_true
 from bbtc.verify.program import (
     NO,
     YES,
     Branch,
     Cell,
+    Charged,
     Choose,
     Command,
     Compare,
@@ -35,13 +37,17 @@ MOST_BRANCHES = 64
 """Branches of one command; an action of more is written in stages."""
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
+_Amounts: TypeAlias = tuple[Fraction, Fraction, Fraction]  # actions, cost, reward
+_Drawn: TypeAlias = tuple[Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction]
 
 
 def relevant(task: Task, actions: Iterable[GroundAction], read: Iterable[int]) -> list[int]:
-    """The variables on which those ``read`` depend, by way of the conditions of effects, in order.
-    The others can change, but change nothing that matters."""
+    """The variables on which those ``read`` depend, by way of the conditions of effects, in order, and those
+    on which costs and rewards do. The others can change, but change nothing that matters."""
+    actions = list(actions)
     effects = [effect for action in actions for effect in effects_of(action.factors)]
-    needed = set(read)
+    charges = (charge for action in actions for charge in charges_of(action.factors))
+    needed = {*read, *(variable for charge in charges for variable in variables(charge.when))}
     while True:
         more = {
             variable
@@ -103,12 +109,15 @@ class Outcomes:
             assert self.stage is not None
             rewards = (_ONE, action.cost, _ZERO)
             return (Branch(_ONE, (*updates, put(self.stage, self._entry[action.name])), rewards),)
-        merged: dict[tuple[tuple[Update, ...], tuple[Fraction, ...]], Fraction] = {}
-        for probability, effects, cost, reward in _draws(action.factors):
+        merged: dict[tuple[tuple[Update, ...], _Amounts, tuple[Charged, ...]], Fraction] = {}
+        for probability, effects, charges, cost, reward in _draws(action.factors):
             if probability:
-                key = ((*updates, *self._set(effects)), (_ONE, action.cost + cost, reward))
+                amounts = (_ONE, action.cost + cost, reward)
+                key = ((*updates, *self._set(effects)), amounts, self._charges(charges))
                 merged[key] = merged.get(key, _ZERO) + probability
-        return tuple(Branch(p, changed, rewards) for (changed, rewards), p in merged.items())
+        return tuple(
+            Branch(p, changed, amounts, charges) for (changed, amounts, charges), p in merged.items()
+        )
 
     # --- one command --------------------------------------------------------------------------
 
@@ -134,6 +143,16 @@ class Outcomes:
                 guards[value] = any_of(guards[value], when)
         return {variable: found[variable] for variable in sorted(found)}
 
+    def _charges(self, charges: Iterable[Charge]) -> tuple[Charged, ...]:
+        """What the charges add, by condition."""
+        found: dict[Expression, _Amounts] = {}
+        for charge in charges:
+            when = where_true(charge.when, self.cell_of)
+            _, cost, reward = found.get(when, (_ZERO, _ZERO, _ZERO))
+            if when != NO:
+                found[when] = (_ZERO, cost + charge.cost, reward + charge.reward)
+        return tuple(Charged(when, amounts) for when, amounts in found.items())
+
     # --- in stages ----------------------------------------------------------------------------
 
     def _series(self, factors: Sequence[Factor], after: int) -> int:
@@ -149,7 +168,9 @@ class Outcomes:
             if outcome.probability:
                 then = put(self.stage, self._series(outcome.factors, after))
                 updates = (*self._note(outcome), then)
-                branches.append(Branch(outcome.probability, updates, (_ZERO, outcome.cost, outcome.reward)))
+                amounts = (_ZERO, outcome.cost, outcome.reward)
+                charges = self._charges(outcome.charges)
+                branches.append(Branch(outcome.probability, updates, amounts, charges))
         self._stages += 1
         own = self._stages
         self.commands.append(
@@ -175,18 +196,19 @@ def _combinations(factors: Sequence[Factor]) -> int:
     return product
 
 
-def _draws(factors: Sequence[Factor]) -> Iterator[tuple[Fraction, tuple[Effect, ...], Fraction, Fraction]]:
-    """Every combination of outcomes: probability, effects, cost, reward."""
+def _draws(factors: Sequence[Factor]) -> Iterator[_Drawn]:
+    """Every combination of outcomes: probability, effects, charges, cost, reward."""
     if not factors:
-        yield _ONE, (), _ZERO, _ZERO
+        yield _ONE, (), (), _ZERO, _ZERO
         return
     *before, last = factors
-    for p, effects, cost, reward in _draws(before):
+    for p, effects, charges, cost, reward in _draws(before):
         for outcome in last.outcomes:
-            for p2, effects2, cost2, reward2 in _draws(outcome.factors):
+            for p2, effects2, charges2, cost2, reward2 in _draws(outcome.factors):
                 yield (
                     p * outcome.probability * p2,
                     (*effects, *outcome.effects, *effects2),
+                    (*charges, *outcome.charges, *charges2),
                     cost + outcome.cost + cost2,
                     reward + outcome.reward + reward2,
                 )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 
 from typing_extensions import assert_never
 
+from bbtc.rounding import digits
 from bbtc.verify.naming import Names
 from bbtc.verify.program import (
     REWARDS,
@@ -23,6 +25,7 @@ from bbtc.verify.program import (
     Program,
     Update,
     Use,
+    all_of,
 )
 
 KEYWORDS = frozenset({
@@ -35,6 +38,10 @@ KEYWORDS = frozenset({
     "S", "sin", "smg", "stochastic", "system", "true", "U", "W", "X", "xor",
 })  # fmt: skip
 """Words that cannot be identifiers in PRISM or in Storm's reading of it."""
+END = "endmodule"
+"""The word that no identifier may hold: wherever it stands, Storm takes it for the end of the module."""
+LARGEST = 2**63 - 1
+"""The largest whole number that Storm reads as one."""
 
 
 def prism_text(program: Program, names: Names, preamble: Sequence[str] = ()) -> str:
@@ -48,8 +55,10 @@ def counted(program: Program) -> list[int]:
     """The rewards, by number, that are never negative, without the task's own where it is 0."""
     found = []
     for number, _ in enumerate(REWARDS):
-        values = [command.reward(number) for command in program.commands]
-        if min(values) >= 0 and (REWARDS[number] != "reward" or any(values)):
+        counts = REWARDS[number] != "reward" or any(
+            command.reward(number) or command.charges(number) for command in program.commands
+        )
+        if counts and all(command.least(number) >= 0 for command in program.commands):
             found.append(number)
     return found
 
@@ -86,10 +95,18 @@ class _Writer:
 
     def rewards(self, number: int) -> Iterator[str]:
         for command in self.program.commands:
-            value = command.reward(number)
-            if value:
-                where = "true" if command.action is not None else self.expression(command.guard)
-                yield f"  [{self.label(command)}] {where} : {value};"
+            items = [(YES, command.reward(number)), *command.charges(number).items()]
+            where = YES if command.action is not None else command.guard
+            if all(amount >= 0 for _, amount in items):  # readers add up what stands in several lines
+                lines = [
+                    (self.expression(all_of(where, when)), _number(amount))
+                    for when, amount in items
+                    if amount
+                ]
+            else:
+                parts = (f"({self.inner(when)} ? {_number(amount)} : 0)" for when, amount in items if amount)
+                lines = [(self.expression(where), " + ".join(parts))]
+            yield from (f"  [{self.label(command)}] {holds} : {added};" for holds, added in lines)
 
     def label(self, command: Command) -> str:
         return "" if command.action is None else self.names.actions[command.action]
@@ -105,7 +122,7 @@ class _Writer:
         last = len(command.branches) - 1
         for number, branch in enumerate(command.branches):
             sign = ";" if number == last else " +"
-            yield f"    {branch.probability} : {self.branch(branch)}{sign}"
+            yield f"    {_number(branch.probability)} : {self.branch(branch)}{sign}"
 
     def branch(self, branch: Branch) -> str:
         return " & ".join(self.update(update) for update in branch.updates) or "true"
@@ -149,6 +166,17 @@ class _Writer:
     def inner(self, expression: Expression) -> str:
         text = self.expression(expression)
         return f"({text})" if isinstance(expression, AllOf | AnyOf) else text
+
+
+def _number(value: Fraction) -> str:
+    """The number, exactly as Storm reads it too: a whole number of more than 64 bits has ``.0``."""
+    sign = "-" if value < 0 else ""
+    whole = sign + _whole(abs(value.numerator))
+    return whole if value.denominator == 1 else f"{whole}/{_whole(value.denominator)}"
+
+
+def _whole(value: int) -> str:
+    return digits(value) if value <= LARGEST else f"{digits(value)}.0"
 
 
 def _comment(remark: str) -> str:

@@ -198,13 +198,26 @@ def put(cell: int, number: int) -> Choose:
 
 
 @dataclass(frozen=True, slots=True)
+class Charged:
+    """What is added to each reward of the program where ``when`` holds in the state before."""
+
+    when: Expression
+    rewards: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Branch:
     """One thing that may happen: its probability, the cells it changes, and what it adds to each
-    reward of the program."""
+    reward of the program, always and under conditions."""
 
     probability: Fraction
     updates: tuple[Update, ...]
     rewards: tuple[Fraction, ...]
+    charges: tuple[Charged, ...] = ()
+
+
+_MOST_TOGETHER = 8
+"""Conditions of which it is looked at which may hold together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,8 +231,28 @@ class Command:
     remark: str = ""
 
     def reward(self, number: int) -> Fraction:
-        """The expectation of a reward over the branches."""
+        """The expectation over the branches of what is always added to a reward."""
         return sum((b.probability * b.rewards[number] for b in self.branches), Fraction(0))
+
+    def charges(self, number: int) -> dict[Expression, Fraction]:
+        """By condition, the expectation over the branches of what is added to a reward where it holds."""
+        found: dict[Expression, Fraction] = {}
+        for branch in self.branches:
+            for charge in branch.charges:
+                amount = branch.probability * charge.rewards[number]
+                found[charge.when] = found.get(charge.when, Fraction(0)) + amount
+        return {when: amount for when, amount in found.items() if amount}
+
+    def least(self, number: int) -> Fraction:
+        """What is added to a reward is in no state less than this."""
+        below = [(when, amount) for when, amount in self.charges(number).items() if amount < 0]
+        if len(below) > _MOST_TOGETHER:
+            return self.reward(number) + sum((amount for _, amount in below), Fraction(0))
+        sums = [(self.guard, self.reward(number))]
+        for when, amount in below:
+            more = [(all_of(held, when), total + amount) for held, total in sums]
+            sums += [(held, total) for held, total in more if held != NO]
+        return min(total for _, total in sums)
 
 
 REWARDS = ("actions", "cost", "reward")
@@ -250,6 +283,7 @@ class Program:
         for command in self.commands:
             yield command.guard
             for branch in command.branches:
+                yield from (charge.when for charge in branch.charges)
                 for update in branch.updates:
                     if isinstance(update, Choose):
                         yield from (condition for condition, _ in update.cases)

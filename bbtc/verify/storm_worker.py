@@ -24,14 +24,16 @@ def answer(question: dict[str, Any]) -> dict[str, Any]:
         file.write_text(question["program"], encoding="utf-8")
         program = stormpy.parse_prism_program(str(file))
     asked = stormpy.parse_properties("; ".join(question["properties"]), program)
-    model = stormpy.build_model[float](program, asked)
-    states = model.nr_states
+    # Floats are quick to build, and do for the number of states; rewards may have no place among them.
+    plain = [one for one, text in zip(asked, question["properties"], strict=True) if not text.startswith("R")]
+    states = stormpy.build_model[float](program, plain).nr_states
     exact = states <= MOST_EXACT
-    environment = stormpy.environments.sound()
     if exact:
         model = stormpy.build_model[stormpy.Rational](program, asked)
         environment = stormpy.environments.exact()
     else:
+        model = stormpy.build_model[float](program, asked)
+        environment = stormpy.environments.sound()
         for solver in (environment.solver().native(), environment.solver().min_max()):
             solver.precision = stormpy.Rational(str(PRECISION))
     (initial,) = model.initial_states

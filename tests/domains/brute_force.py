@@ -114,11 +114,12 @@ def _every(
         return
     for outcome in factors[0].outcomes:
         for p, sets, cost, reward in _every(outcome.factors + factors[1:], values):
+            due = [charge for charge in outcome.charges if value_of(charge.when, values) == "T"]
             yield (
                 outcome.probability * p,
                 _settings(outcome, values) + sets,
-                outcome.cost + cost,
-                outcome.reward + reward,
+                outcome.cost + cost + sum(charge.cost for charge in due),
+                outcome.reward + reward + sum(charge.reward for charge in due),
             )
 
 

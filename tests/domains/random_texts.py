@@ -100,22 +100,25 @@ class _Writer:
         listed, more = self.parameters("?x ?y ?z", 2)
         return f"({self.among('exists', 'forall')} ({listed}) {inner({**scope, **more})})"
 
-    def effect(self, scope: Scope, depth: int, *, sure: bool = True) -> str:
-        def inner(inside: Scope = scope, *, sure: bool = sure) -> str:
-            return self.effect(inside, depth - 1, sure=sure)
+    def increase(self) -> str:
+        fluent = self.among(self.cost, self.cost, "total-cost")
+        return f"(increase ({fluent}) {self.among(*_AMOUNTS)})"
+
+    def effect(self, scope: Scope, depth: int, *, priced: bool = True) -> str:
+        def inner(inside: Scope = scope) -> str:
+            return self.effect(inside, depth - 1, priced=priced)
 
         drawn = self.random.random()
         if depth <= 0 or drawn < 0.4:
             atom = self.atom(scope, self.fluents)
             self.changed.append(atom)
-            if self.cost and sure and drawn < 0.1:
-                fluent = self.among(self.cost, self.cost, "total-cost")
-                return f"(increase ({fluent}) {self.among(*_AMOUNTS)})"
+            if self.cost and priced and drawn < 0.1:
+                return self.increase()
             return self.among(atom, atom, f"(not {atom})", f"(unknown {atom})")
         if drawn < 0.55:
             return f"(and {' '.join(inner() for _ in range(self.random.randint(0, 3)))})"
         if drawn < 0.68:
-            return f"(when {self.condition(scope, 1, self.declared)} {inner(sure=False)})"
+            return f"(when {self.condition(scope, 1, self.declared)} {inner()})"
         if drawn < 0.75:
             listed, more = self.parameters("?x ?y ?z", 1)
             return f"(forall ({listed}) {inner({**scope, **more})})"
@@ -139,6 +142,14 @@ class _Writer:
         if self.cost:
             effects += f" (increase ({self.cost}) {self.among(*_AMOUNTS)})"
         self.callable[name] = list(scope.values())
+            if self.random.random() < 0.6:
+                read = self.atom(scope, self.fluents)
+                read = self.among(
+                    read, f"(not {read})", f"(unknown {read})", self.condition(scope, 1, self.declared)
+                )
+                more = f"(when {read} (increase ({self.cost}) {self.among(*_AMOUNTS)}))"
+                perhaps = f"(probabilistic 0.5 {more} 0.3 {self.atom(scope, self.fluents)})"
+                effects += f" {self.among(more, more, perhaps)}"
         fields = [f":parameters ({listed})", f":precondition {needs}", f":effect (and {effects})"]
         if self.random.random() < 0.2:
             self.random.shuffle(fields)
@@ -226,7 +237,7 @@ class _Writer:
     def template(self, name: str) -> str:
         listed, scope = self.parameters("?x", 1)
         needs = self.among("()", self.condition(scope, 2, self.declared), self.tested(self.read(scope)))
-        guide = " ".join(self.effect(scope, 1, sure=False) for _ in range(self.random.randint(1, 2)))
+        guide = " ".join(self.effect(scope, 1, priced=False) for _ in range(self.random.randint(1, 2)))
         text = (
             f"(:template {name} :parameters ({listed}) :precondition {needs}"
             f" :effect (and {guide}) :body {self.body(scope, 2)})"

@@ -180,13 +180,29 @@ def test_only_the_fluent_that_the_metric_names_counts(metric: str, cost: str, re
     assert (action.cost, outcome.reward) == (Fraction(cost), Fraction(reward))
 
 
-def test_a_cost_under_a_condition_is_refused_with_its_place() -> None:
-    with pytest.raises(BbtcError) as caught:
-        _task("(and (p) (not (q)) (when (q) (increase (total-cost) 1)))", "(q)")
-    (diagnostic,) = caught.value.diagnostics
-    assert diagnostic.code == "BBT0409"
-    assert diagnostic.span is not None
-    assert diagnostic.span.text == "(increase (total-cost) 1)"
+def test_costs_and_rewards_under_a_condition_are_charges_of_the_outcome() -> None:
+    action = _only(
+        _task(
+            "(and (p) (not (q)) (increase (total-cost) 3)"
+            " (when (q) (and (increase (total-cost) 1) (increase (total-cost) 1/2) (decrease (reward) 2))))",
+            "(q)",
+        )
+    )
+    (outcome,) = action.factors[0].outcomes
+    (charge,) = outcome.charges
+    assert (action.cost, outcome.cost, outcome.reward) == (3, 0, 0)
+    assert (charge.cost, charge.reward) == (Fraction(3, 2), -2)
+
+
+def test_what_only_a_cost_reads_stays_in_the_task() -> None:
+    """No precondition and no goal reads `q`, and `spoil` does nothing else than to set it."""
+    text = """(define (domain d) (:predicates (p) (q) (r)) (:functions (total-cost))
+      (:action spoil :effect (and (q) (r)))
+      (:action go :effect (and (p) (when (q) (increase (total-cost) 5)))))
+      (define (problem x) (:domain d) (:init) (:goal (p)))"""
+    task = task_of(text)
+    assert [variable.name for variable in task.variables] == ["p()", "q()"]
+    assert [action.name for action in task.actions] == ["go()", "spoil()"]
 
 
 def test_a_missing_number_is_named() -> None:
