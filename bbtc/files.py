@@ -18,6 +18,7 @@ from bbtc.printable import printable
 KEPT = frozenset((".git", ".bbtc"))
 """Folders that nothing is written to: they belong to git and to ``bbtc build``."""
 
+_PIECE = 1 << 20  # bytes
 _MOST_COMPARED = 4000  # lines that differ; beyond, finding out how takes too long
 
 # --- reading ---------------------------------------------------------------------------------
@@ -35,7 +36,16 @@ def read_file(path: str | os.PathLike[str], most: int, *, descriptors: bool = Fa
             if not (descriptors and _was_given(os.fspath(path))):
                 raise OSError(errno.EINVAL, _what_it_is(mode))
             os.set_blocking(opened, True)
-        return stream.read(most)
+        return read_stream(stream, most)
+
+
+def read_stream(stream: BinaryIO, most: int) -> bytes:
+    """What a stream gives, as far as it goes to ``most`` bytes, without room for all of them beforehand."""
+    parts: list[bytes] = []
+    while most > 0 and (part := stream.read(min(most, _PIECE))):
+        parts.append(part)
+        most -= len(part)
+    return b"".join(parts)
 
 
 def _was_given(path: str) -> bool:
@@ -228,7 +238,7 @@ class Outputs:
     def _differs(self, output: _Output) -> bool:
         if _is_poured(output):
             return not self.check
-        most = -1 if self.check else len(output.data) + 1
+        most = sys.maxsize if self.check else len(output.data) + 1
         try:
             old = read_file(output.path, most)
         except FileNotFoundError:

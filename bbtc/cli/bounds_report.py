@@ -13,6 +13,7 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.plan.bounds import TaskValue
 from bbtc.plan.why_not import Block, DeadEnd
+from bbtc.printable import printable
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree
 
@@ -49,7 +50,7 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
         lines.append(value.stop.message)
     if value.interrupted:
         lines.append("interrupted")
-    return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{printable(line)}\n" for line in lines)
 
 
 def bounds_lines(tree: Tree, max_actions: int | None = None) -> list[str]:
