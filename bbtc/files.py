@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import BinaryIO
 
 from bbtc.diagnostics import BbtcError, Diagnostic
-from bbtc.folder import Batch, Folder
+from bbtc.folder import Batch, Folder, what_it_is
 from bbtc.printable import printable
 
 KEPT = frozenset((".git", ".bbtc"))
@@ -34,7 +34,7 @@ def read_file(path: str | os.PathLike[str], most: int, *, descriptors: bool = Fa
         mode = os.fstat(opened).st_mode
         if not stat.S_ISREG(mode):
             if not (descriptors and _was_given(os.fspath(path))):
-                raise OSError(errno.EINVAL, _what_it_is(mode))
+                raise OSError(errno.EINVAL, what_it_is(mode))
             os.set_blocking(opened, True)
         return read_stream(stream, most)
 
@@ -54,12 +54,6 @@ def _was_given(path: str) -> bool:
         return True
     own = {os.path.realpath(folder) for folder in ("/dev/fd", "/proc/self/fd")}
     return os.path.realpath(os.path.dirname(path)) in own
-
-
-def _what_it_is(mode: int) -> str:
-    if stat.S_ISFIFO(mode):
-        return "it is a named pipe, not a file ('-' reads the standard input)"
-    return "it is a device, not a file" if stat.S_ISCHR(mode) or stat.S_ISBLK(mode) else "it is not a file"
 
 
 def reason(error: OSError | ValueError) -> str:

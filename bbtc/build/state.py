@@ -226,15 +226,21 @@ def sole_builder(folder: Path) -> Iterator[Held]:
 
     Raises :class:`BbtcError` if the folder cannot be written, or a link is in the way."""
     with contextlib.ExitStack() as stack:
+        at = FOLDER
         try:
             shown = source_name(folder, "")
             project = stack.enter_context(Folder("" if shown == "." else shown))
             own = stack.enter_context(project.sub(FOLDER, make=True))
+            at = f"{FOLDER}/scratch"
             scratch = stack.enter_context(own.sub("scratch", make=True))
+            at = f"{FOLDER}/{_STATE}"
+            own.require_place((_STATE,))
+            at = f"{FOLDER}/.gitignore"
             _ignore_itself(own, scratch)
+            at = f"{FOLDER}/{_LOCK}"
             lock = own.open(_LOCK, os.O_RDWR | os.O_CREAT)
         except OSError as error:
-            raise cannot_build(source_name(folder, FOLDER), error) from error
+            raise cannot_build(source_name(folder, at), error) from error
         stack.callback(os.close, lock)
         try:
             import fcntl
