@@ -12,12 +12,13 @@ from dataclasses import dataclass, field
 from typing import BinaryIO
 
 from bbtc.diagnostics import BbtcError, Diagnostic
-from bbtc.folder import Batch, Folder
+from bbtc.folder import Batch, Folder, what_it_is
 from bbtc.printable import printable
 
 KEPT = frozenset((".git", ".bbtc"))
 """Folders that nothing is written to: they belong to git and to ``bbtc build``."""
 
+_PIECE = 1 << 20  # bytes
 _MOST_COMPARED = 4000  # lines that differ; beyond, finding out how takes too long
 
 # --- reading ---------------------------------------------------------------------------------
@@ -33,9 +34,18 @@ def read_file(path: str | os.PathLike[str], most: int, *, descriptors: bool = Fa
         mode = os.fstat(opened).st_mode
         if not stat.S_ISREG(mode):
             if not (descriptors and _was_given(os.fspath(path))):
-                raise OSError(errno.EINVAL, _what_it_is(mode))
+                raise OSError(errno.EINVAL, what_it_is(mode))
             os.set_blocking(opened, True)
-        return stream.read(most)
+        return read_stream(stream, most)
+
+
+def read_stream(stream: BinaryIO, most: int) -> bytes:
+    """What a stream gives, as far as it goes to ``most`` bytes, without room for all of them beforehand."""
+    parts: list[bytes] = []
+    while most > 0 and (part := stream.read(min(most, _PIECE))):
+        parts.append(part)
+        most -= len(part)
+    return b"".join(parts)
 
 
 def _was_given(path: str) -> bool:
@@ -44,12 +54,6 @@ def _was_given(path: str) -> bool:
         return True
     own = {os.path.realpath(folder) for folder in ("/dev/fd", "/proc/self/fd")}
     return os.path.realpath(os.path.dirname(path)) in own
-
-
-def _what_it_is(mode: int) -> str:
-    if stat.S_ISFIFO(mode):
-        return "it is a named pipe, not a file ('-' reads the standard input)"
-    return "it is a device, not a file" if stat.S_ISCHR(mode) or stat.S_ISBLK(mode) else "it is not a file"
 
 
 def reason(error: OSError | ValueError) -> str:
@@ -228,7 +232,7 @@ class Outputs:
     def _differs(self, output: _Output) -> bool:
         if _is_poured(output):
             return not self.check
-        most = -1 if self.check else len(output.data) + 1
+        most = sys.maxsize if self.check else len(output.data) + 1
         try:
             old = read_file(output.path, most)
         except FileNotFoundError:

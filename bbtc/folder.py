@@ -93,8 +93,9 @@ class Folder:
                 raise OSError(errno.ELOOP, LINK, self.shown(name)) from None
             raise
         if not stat.S_ISREG(os.fstat(opened).st_mode):
+            found = os.fstat(opened)
             os.close(opened)
-            raise OSError(errno.EINVAL, "it is not a regular file")
+            raise OSError(errno.EINVAL, what_it_is(found.st_mode))
         return opened
 
     def read(self, name: str, most: int) -> bytes:
@@ -194,7 +195,14 @@ def _require_file(found: os.stat_result, shown: str) -> None:
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(errno.EISDIR, "it is a directory", shown)
     if not stat.S_ISREG(found.st_mode):
-        raise OSError(errno.EINVAL, "it is not a regular file", shown)
+        raise OSError(errno.EINVAL, what_it_is(found.st_mode), shown)
+
+
+def what_it_is(mode: int) -> str:
+    """What stands where a regular file should, by the mode that the system tells of it."""
+    if stat.S_ISFIFO(mode):
+        return "it is a named pipe, not a file"
+    return "it is a device, not a file" if stat.S_ISCHR(mode) or stat.S_ISBLK(mode) else "it is not a file"
 
 
 def _is_link(found: os.stat_result) -> bool:

@@ -5,7 +5,7 @@ and everything is built again. A step is up to date if the digest of its setting
 inputs and those of its outputs are all what they were.
 
 A state counts only in the folder that it was written in: it names the lock beside it by what the system gave
-that file when it was made. One that came along with a stranger's project is none.
+that file when it was made. One that came along with a stranger's project is none, nor is one that was edited.
 """
 
 from __future__ import annotations
@@ -157,7 +157,13 @@ def load_state(folder: Path) -> State:
     """The state of a project; an empty one where there is none, or none that this version wrote here."""
     try:
         data = json.loads(read_file(folder / FOLDER / _STATE, _MOST_BYTES))
-        if data["format"] != _FORMAT or data["version"] != _VERSION or data["lock"] != _lock_id(folder):
+        seal = data.pop("seal")
+        if (
+            data["format"] != _FORMAT
+            or data["version"] != _VERSION
+            or data["lock"] != _lock_id(folder)
+            or seal != settings_digest(data)
+        ):
             return State()
         return State(
             {str(name): str(text) for name, text in data["versions"].items()},
@@ -214,6 +220,7 @@ class Held:
                 for name, steps in state.trees.items()
             },
         }
+        value["seal"] = settings_digest(value)
         with contextlib.suppress(OSError), Batch(self.scratch) as batch:
             batch.put(self.own, _STATE, json.dumps(value).encode())
             batch.commit()
@@ -226,15 +233,21 @@ def sole_builder(folder: Path) -> Iterator[Held]:
 
     Raises :class:`BbtcError` if the folder cannot be written, or a link is in the way."""
     with contextlib.ExitStack() as stack:
+        at = FOLDER
         try:
             shown = source_name(folder, "")
             project = stack.enter_context(Folder("" if shown == "." else shown))
             own = stack.enter_context(project.sub(FOLDER, make=True))
+            at = f"{FOLDER}/scratch"
             scratch = stack.enter_context(own.sub("scratch", make=True))
+            at = f"{FOLDER}/{_STATE}"
+            own.require_place((_STATE,))
+            at = f"{FOLDER}/.gitignore"
             _ignore_itself(own, scratch)
+            at = f"{FOLDER}/{_LOCK}"
             lock = own.open(_LOCK, os.O_RDWR | os.O_CREAT)
         except OSError as error:
-            raise cannot_build(source_name(folder, FOLDER), error) from error
+            raise cannot_build(source_name(folder, at), error) from error
         stack.callback(os.close, lock)
         try:
             import fcntl

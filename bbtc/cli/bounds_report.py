@@ -12,6 +12,7 @@ from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.plan.bounds import TaskValue
 from bbtc.plan.why_not import DeadEnd
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 
 _MOST_ENDS = 10  # dead ends told
@@ -47,7 +48,7 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
         lines.append(value.stop.message)
     if value.interrupted:
         lines.append("interrupted")
-    return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{printable(line)}\n" for line in lines)
 
 
 def bounds_lines(tree: Tree, max_actions: int | None = None) -> list[str]:

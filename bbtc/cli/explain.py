@@ -12,6 +12,7 @@ from bbtc.cli.session import Session
 from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
 from bbtc.pages import page
+from bbtc.printable import printable
 
 
 def _code(text: str) -> str:
@@ -28,7 +29,7 @@ def _code(text: str) -> str:
     else:
         near = difflib.get_close_matches(code[:20], CODES, 3, 0.7)
     hint = f" Near ones: {', '.join(near)}." if near else ""
-    raise click.UsageError(f"There is no code '{text[:40]}'.{hint} `bbtc explain` lists all.")
+    raise click.UsageError(f"There is no code '{printable(text[:40])}'.{hint} `bbtc explain` lists all.")
 
 
 @click.command("explain")

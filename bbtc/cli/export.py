@@ -20,6 +20,7 @@ from bbtc.cli.session import (
 )
 from bbtc.cli.verify import require_verified
 from bbtc.plan.strategies import DEFAULT
+from bbtc.printable import printable
 
 
 def _list_formats(ctx: click.Context, _parameter: click.Parameter, value: bool) -> None:
@@ -120,5 +121,5 @@ def require_place(
 def _pair(option: str) -> tuple[str, str]:
     name, equals, value = option.partition("=")
     if not equals:
-        raise click.UsageError(f"'{option}' is not of the form NAME=VALUE.")
+        raise click.UsageError(f"'{printable(option)}' is not of the form NAME=VALUE.")
     return name, value

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
+from bbtc.artefacts.jsontext import escaped
 from bbtc.codes import CODES
 from bbtc.diagnostics import Diagnostic, Severity
 from bbtc.source import Span
@@ -19,9 +21,9 @@ def render(diagnostics: Sequence[Diagnostic], form: str, *, color: bool = False)
     """The diagnostics in one of the forms ``text``, ``json``, ``sarif`` and ``github``; ends with
     a newline unless it is empty."""
     if form == "json":
-        return json.dumps([_as_json(d) for d in diagnostics], indent=2, ensure_ascii=False) + "\n"
+        return escaped(json.dumps([_as_json(d) for d in diagnostics], indent=2, ensure_ascii=False)) + "\n"
     if form == "sarif":
-        return json.dumps(_as_sarif(diagnostics), indent=2, ensure_ascii=False) + "\n"
+        return escaped(json.dumps(_as_sarif(diagnostics), indent=2, ensure_ascii=False)) + "\n"
     if form == "github":
         return "".join(f"{_as_github(d)}\n" for d in diagnostics)
     return "".join(f"{_colored(d) if color else d.render()}\n" for d in diagnostics)
@@ -66,7 +68,7 @@ def _location(span: Span) -> dict[str, object]:
 def _uri(name: str) -> str:
     """The name of a file as a reference: relative, or with a scheme where it is absolute."""
     path = Path(name)
-    return path.as_uri() if path.is_absolute() else quote(path.as_posix(), safe="/")
+    return path.as_uri() if path.is_absolute() else quote(os.fsencode(path.as_posix()), safe="/")
 
 
 def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:

@@ -187,6 +187,9 @@ def output_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 _MIB = 1 << 20
+MOST = 10**12
+"""Largest number that an option takes: more than anybody needs, and no more than the system can count."""
+
 # Option, field of Limits, smallest and largest value, unit (1: as it is), help.
 _READING = (
     ("--max-file-size", "file_bytes", 1, None, _MIB, "MiB of an input file."),
@@ -214,7 +217,7 @@ def _limits(*tables: _Table, timed: bool) -> Callable[[Callable[..., Any]], Call
             function = click.option(
                 option,
                 f"limit_{field_name}",
-                type=click.IntRange(least, most),
+                type=click.IntRange(least, MOST if most is None else most),
                 default=default,
                 show_default=True,
                 help=told,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from bbtc.cli.session import Session, limit_options
+from bbtc.cli.session import MOST, Session, limit_options
 from bbtc.cli.session import command as session_command
 from bbtc.diagnostics import LimitReached
 
@@ -21,18 +21,22 @@ if TYPE_CHECKING:
 @click.command("simulate")
 @click.argument("tree", metavar="TREE")
 @click.option(
-    "--scenarios", type=click.IntRange(0), default=0, metavar="N", help="List the N most probable runs."
+    "--scenarios", type=click.IntRange(0, MOST), default=0, metavar="N", help="List the N most probable runs."
+)
+@click.option(
+    "--samples", type=click.IntRange(1, MOST), metavar="N", help="Also sample N runs (Monte Carlo)."
+)
+@click.option(
+    "--seed", type=click.IntRange(-MOST, MOST), default=0, show_default=True, help="Seed of the sampling."
 )
 @click.option(
     "--failing",
-    type=click.IntRange(0),
+    type=click.IntRange(0, MOST),
     default=3,
     show_default=True,
     metavar="N",
     help="List the N most probable runs that fail, each with the fact it lacks at its root.",
 )
-@click.option("--samples", type=click.IntRange(1), metavar="N", help="Also sample N runs (Monte Carlo).")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the sampling.")
 @click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON instead of text.")
 @click.option("-o", "--output", default="-", metavar="FILE", help="Where to write; - is stdout (default).")
 @limit_options

@@ -9,6 +9,7 @@ from fractions import Fraction
 from bbtc.export.diagram import FLOW, flow_text
 from bbtc.export.outline import ASCII, UNICODE, label, outline
 from bbtc.export.registry import Figures, Option, OptionValue
+from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 
 
@@ -34,7 +35,7 @@ class TextExporter:
             if figures is not None:
                 line += f"  {flow_text(figures.get(node.id, Fraction(0)))}"
             if options["ids"]:
-                line += f"  #{node.id}"
+                line += f"  #{printable(node.id)}"
             lines.append(line)
         text = "".join(f"{line}\n" for line in lines)
         return text.encode("ascii", "backslashreplace").decode() if strokes is ASCII else text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     import yaml
 
 _MOST_LEVELS = 20
+_MOST_REPEATED = 50  # keys that are told
+_MOST_PARTS = 50  # of a dotted key
 _CORE = "tag:yaml.org,2002:"
 _NUMBERS = frozenset((f"{_CORE}int", f"{_CORE}float"))
 _TEXTS = frozenset((f"{_CORE}str", f"{_CORE}timestamp", f"{_CORE}value"))
@@ -119,10 +122,10 @@ class _Builder:
     def span(self, start: Any, end: Any) -> Span:
         """The place between two marks, cut to its first line."""
         first = min(start.index, max(0, len(self.source.text) - 1))
-        stop = self.source.text.find("\n", first)
-        return Span(
-            self.source, first, max(first + 1, min(end.index, stop if stop >= 0 else len(self.source.text)))
-        )
+        starts = self.source.line_starts
+        following = bisect_right(starts, first)  # not by looking for a line end: a line may be very long
+        stop = starts[following] - 1 if following < len(starts) else len(self.source.text)
+        return Span(self.source, first, max(first + 1, min(end.index, stop)))
 
     def take(self, event: yaml.Event) -> None:
         """One event."""
@@ -179,7 +182,8 @@ class _Builder:
         key = str(event.value)
         if key in members:
             message = f"at {path_text(inside.path)}: '{clip(key)}' stands twice"
-            self.repeated.append(Diagnostic("BBT0603", message, self._place(event)))
+            if len(self.repeated) < _MOST_REPEATED:
+                self.repeated.append(Diagnostic("BBT0603", message, self._place(event)))
         inside.key = key
         self.keys.setdefault((*inside.path, key), self._place(event))
 
@@ -224,16 +228,22 @@ def read_toml(source: SourceFile) -> Marked:
     else:
         import tomli as tomllib
 
+    deep = _TOML_DEEP.search(source.text)  # which takes the square of its length to read
+    if deep is not None:
+        at = Span(source, deep.end() - 1, deep.end())
+        raise BbtcError.single("BBT0605", f"a key of more than {_MOST_PARTS} parts", at)
     try:
-        value = tomllib.loads(source.text, parse_float=Written)
+        value = _written(tomllib.loads(source.text, parse_float=Written))
     except tomllib.TOMLDecodeError as error:
         raise BbtcError.single(
             "BBT1001", f"not valid TOML: {clip(str(error))}", _toml_place(source, str(error))
         ) from None
+    except ValueError:  # what Python says of numbers that take it long
+        raise BbtcError.single("BBT1001", "not valid TOML: a whole number of too many digits") from None
     except RecursionError:
         raise BbtcError.single("BBT0605", "TOML nested too deeply") from None
     spans, keys = _toml_spans(source)
-    return Marked(_written(value), source, spans, keys)
+    return Marked(value, source, spans, keys)
 
 
 def _toml_place(source: SourceFile, message: str) -> Span | None:
@@ -258,6 +268,7 @@ def _written(value: object) -> object:
 
 _PART = r"""(?:[A-Za-z0-9_-]+|"[^"\\\n]*"|'[^'\n]*')"""
 _DOTTED = rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*"
+_TOML_DEEP = re.compile(rf"(?:^|[{{,\[])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{_MOST_PARTS}}}", re.MULTILINE)
 _TOML_LINE = re.compile(
     rf"^[ \t]*(?:\[[ \t]*(?P<table>{_DOTTED})[ \t]*\]|(?P<key>{_DOTTED})[ \t]*=[ \t]*(?P<value>[^\n]*))",
     re.MULTILINE,

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
-from typing import TypeVar
+from typing import TypeVar, cast
 
-from bbtc.artefacts.cursor import At, Fault, Faults, clip, run_reader
+from bbtc.artefacts.cursor import At, Fault, Faults, Stop, clip, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.diagnostics import BbtcError
 from bbtc.export.registry import Exporter, load_exporter, parse_options
@@ -28,6 +28,8 @@ DEFAULT_OUTPUT = "build"
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*(?:/[A-Za-z0-9_][A-Za-z0-9_.-]*)*")
 _MOST = 1000  # expectations or exports of one tree
+MOST_VALUES = 250_000
+"""Settings, expectations and exports of all trees, those that are shared counted for each."""
 _INPUTS = ("domain", "problem")
 _PLANNING = ("target", "strategy", "max-actions", "retries", "guarded", "limits")
 _SETTINGS = (*_INPUTS, *_PLANNING, "exports", "expect")
@@ -108,17 +110,19 @@ class _Reader:
     places: Places
     output: str = DEFAULT_OUTPUT
     exporters: dict[str, Exporter] = field(default_factory=dict)
+    shared: dict[str, object] = field(default_factory=dict)
+    left: int = MOST_VALUES
 
     def manifest(self, at: At, file: Path) -> Manifest:
         """The whole manifest."""
-        members = _members(at, ["trees"], ["version", "output", "defaults"])
+        members = self._members(at, ["trees"], ["version", "output", "defaults"])
         if "version" in members and members["version"].value != "1":
             raise members["version"].fault("BBT0602", "this version of bbtc reads version 1")
         if "output" in members:
             self.output = self.faults.attempt(lambda: _inside(members["output"]), DEFAULT_OUTPUT)
         defaults: dict[str, At] = {}
         if "defaults" in members:
-            defaults = self.faults.attempt(lambda: _members(members["defaults"], [], _SETTINGS), {})
+            defaults = self.faults.attempt(lambda: self._members(members["defaults"], [], _SETTINGS), {})
         trees = []
         for name, entry in members["trees"].entries():
             try:
@@ -136,7 +140,7 @@ class _Reader:
                 f"'{clip(name)}' cannot name a tree",
                 "use letters, digits, '_', '-', '.', and '/' between parts",
             )
-        found = {**defaults, **_members(at, [], [*_SETTINGS, "tree"])}
+        found = {**defaults, **self._members(at, [], [*_SETTINGS, "tree"])}
         if "domain" not in found:
             raise at.fault("BBT0603", "field 'domain' is missing")
         attempt = self.faults.attempt
@@ -150,7 +154,13 @@ class _Reader:
             self.places.read(path)
 
         def optional(key: str, read: Callable[[At], _T], default: _T) -> _T:
-            return attempt(lambda: read(found[key]), default) if key in found else default
+            if key not in found:
+                return default
+            if found[key] is not defaults.get(key) or key == "exports":  # whose files have the tree's name
+                return attempt(lambda: read(found[key]), default)
+            if key not in self.shared:
+                self.shared[key] = attempt(lambda: read(found[key]), default)
+            return cast("_T", self.shared[key])
 
         return TreeEntry(
             name=name,
@@ -169,11 +179,11 @@ class _Reader:
         )
 
     def _limits(self, at: At) -> tuple[tuple[str, int], ...]:
-        members = _members(at, [], list(_LIMITS))
+        members = self._members(at, [], list(_LIMITS))
         return tuple((_LIMITS[name], _count(each)) for name, each in sorted(members.items()))
 
     def _expectations(self, at: At) -> tuple[Expectation, ...]:
-        return tuple(self.faults.each(_few(at.elements(), at), self._expectation))
+        return tuple(self.faults.each(self._few(at.elements(), at), self._expectation))
 
     def _expectation(self, at: At) -> Expectation:
         try:
@@ -186,9 +196,9 @@ class _Reader:
     def _exports(self, at: At, tree: str) -> tuple[Export, ...]:
         """A list of formats, or a mapping from names to what is to be made."""
         if isinstance(at.value, list):
-            named = [(_text(each), At(None, each.path)) for each in _few(at.elements(), at)]
+            named = [(_text(each), At(None, each.path)) for each in self._few(at.elements(), at)]
         else:
-            named = _few(list(at.entries()), at)
+            named = self._few(list(at.entries()), at)
         exports = []
         for name, each in named:
             try:
@@ -203,7 +213,7 @@ class _Reader:
         if isinstance(at.value, str):
             members = {"file": at}
         elif at.value is not None:
-            members = _members(at, [], ["format", "file", "options"])
+            members = self._members(at, [], ["format", "file", "options"])
         form = _text(members["format"]) if "format" in members else name
         if form not in self.exporters:
             self.exporters[form] = _diagnosed(members.get("format", at), lambda: load_exporter(form))
@@ -232,21 +242,30 @@ class _Reader:
         _diagnosed(at, lambda: parse_options(exporter, texts))
         return tuple(sorted(texts.items()))
 
+    # --- how much ----------------------------------------------------------------------------
+
+    def _members(self, at: At, required: list[str], optional: list[str] | tuple[str, ...]) -> dict[str, At]:
+        """As :meth:`At.members`; where the value is no mapping, words that YAML's writers know."""
+        if not isinstance(at.value, dict):
+            raise at.fault("BBT0604", "must be a mapping of keys to values")
+        self._spend(len(at.value), at)
+        return at.members(required, optional)
+
+    def _few(self, items: list[_T], at: At) -> list[_T]:
+        if len(items) > _MOST:
+            raise at.fault("BBT0604", f"more than {_MOST}")
+        self._spend(len(items), at)
+        return items
+
+    def _spend(self, values: int, at: At) -> None:
+        """Defaults and aliases let a short text say very much."""
+        self.left -= values
+        if self.left < 0:
+            self.faults.add(at.fault("BBT0005", f"the trees have more than {MOST_VALUES} settings in all"))
+            raise Stop
+
 
 # --- single values ---------------------------------------------------------------------------
-
-
-def _members(at: At, required: list[str], optional: list[str] | tuple[str, ...]) -> dict[str, At]:
-    """As :meth:`At.members`; where the value is no mapping, words that YAML's writers know."""
-    if not isinstance(at.value, dict):
-        raise at.fault("BBT0604", "must be a mapping of keys to values")
-    return at.members(required, optional)
-
-
-def _few(items: list[_T], at: At) -> list[_T]:
-    if len(items) > _MOST:
-        raise at.fault("BBT0604", f"more than {_MOST}")
-    return items
 
 
 def _text(at: At) -> str:

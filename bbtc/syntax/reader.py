@@ -7,7 +7,7 @@ import re
 import sys
 
 from bbtc.diagnostics import BbtcError
-from bbtc.files import read_file, reason
+from bbtc.files import read_file, read_stream, reason
 from bbtc.source import SourceFile, Span
 
 MAX_BYTES = 64 * 1024 * 1024
@@ -41,7 +41,7 @@ def read_source(path: str, max_bytes: int = MAX_BYTES) -> SourceFile:
 def _standard_input(most: int) -> bytes:
     if sys.stdin is None:
         raise OSError(errno.EBADF, "it is closed")
-    return sys.stdin.buffer.read(most)
+    return read_stream(sys.stdin.buffer, most)
 
 
 def decode_source(name: str, data: bytes) -> SourceFile:

@@ -321,3 +321,60 @@ def test_the_schema_knows_every_figure_and_setting() -> None:
 def test_the_schema_knows_every_strategy() -> None:
     strategy = SCHEMA["$defs"]["strategy"]
     assert (set(strategy["enum"]), strategy["default"]) == (set(STRATEGIES), DEFAULT)
+
+
+# --- how much ----------------------------------------------------------------------------------
+
+IN_TOML = "[tool.bbtc.trees.a]\ndomain = 'd'\n"
+MUCH = {
+    "a whole number of 5,000 digits": (f"{IN_TOML}x-a = {'9' * 5000}\n", "BBT1001"),
+    "one of 5,000 digits in base 16": (f"{IN_TOML}x-a = 0x{'f' * 5000}\n", "BBT1001"),
+    "a dotted key": (f"{IN_TOML}x-a{'.a' * 100_000} = 1\n", "BBT0605"),
+    "a dotted key in quotes": (IN_TOML + "x-a" + ".'b'" * 50_000 + " = 1\n", "BBT0605"),
+    "a dotted table": (f"[tool.bbtc{' . a' * 50_000}]\n", "BBT0605"),
+    "a dotted key inside": (f"{IN_TOML}x-a = {{a{'.a' * 100_000} = 1}}\n", "BBT0605"),
+    "blanks": (f"{IN_TOML}{' ' * 200_000}!\n", "BBT1001"),
+    "words": (f"{IN_TOML}{'a ' * 100_000}\n", "BBT1001"),
+    "defaults for all": (
+        "defaults: {domain: d, limits: {" + "".join(f"x-{i}: 1, " for i in range(20_000)) + "}}\n"
+        "trees: {" + "".join(f"t{i}: {{}}, " for i in range(1000)) + "}\n",
+        "",
+    ),
+    "exports for all": (
+        "defaults: {domain: d, exports: {" + "".join(f"e{i}: {{format: dot}}, " for i in range(999)) + "}}\n"
+        "trees: {" + "".join(f"t{i}: {{}}, " for i in range(1000)) + "}\n",
+        "BBT0005",
+    ),
+    "an alias of much": (
+        "x-x: &x {" + "".join(f"x-{i}: 1, " for i in range(20_000)) + "}\n"
+        "trees: {" + "".join(f"t{i}: {{domain: d, limits: *x}}, " for i in range(1000)) + "}\n",
+        "BBT0005",
+    ),
+    "a key that stands often": (f"{BASE}x-a: {{{'a: 1, ' * 20_000}}}\n", "BBT0603"),
+}
+
+
+@pytest.mark.parametrize("name", MUCH)
+def test_a_manifest_that_says_too_much_is_refused_at_once(name: str) -> None:
+    text, code = MUCH[name]
+    file = Path("bbtc.yaml" if "trees:" in text else "pyproject.toml")
+    start = time.process_time()
+    found = set()
+    try:
+        read_manifest(file, text.encode())
+    except BbtcError as error:
+        found = {diagnostic.code for diagnostic in error.diagnostics}
+    assert found == ({code} if code else set())
+    assert time.process_time() - start < 30  # what was wrong took minutes
+
+
+@pytest.mark.parametrize("form", ["x-a: [{}]\n", "x-a: {{{}}}\n"])
+def test_the_length_of_a_line_does_not_count_twice(form: str) -> None:
+    def seconds(count: int) -> float:
+        text = BASE + form.format("".join(f"a{number}: b, " for number in range(count)))
+        start = time.process_time()
+        read_manifest(Path("bbtc.yaml"), text.encode())
+        return time.process_time() - start
+
+    seconds(100)
+    assert seconds(16_000) < 10 * seconds(4_000)

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Any
 
 import pytest
 
+import bbtc
 from bbtc.diagnostics import BbtcError
 from bbtc.export import registry
-from bbtc.export.registry import Exporter, Option, format_names, load_exporter, parse_options
+from bbtc.export.registry import Exporter, Files, Option, format_names, load_exporter, parse_options
+
+DOMAINS = Path(__file__).parents[2] / "domains"
 
 
 class Plain:
@@ -92,6 +97,41 @@ def test_a_plugin_that_is_no_exporter_is_an_error(monkeypatch: pytest.MonkeyPatc
     with pytest.raises(BbtcError) as error:
         load_exporter("mine")
     assert code_of(error) == "BBT0703"
+
+
+class Failing:
+    """An exporter of a stranger; what it does instead of its work is set by the test."""
+
+    name, description, suffix, options = "failing", "for tests", ".txt", ()
+
+    def __init__(self, artefact: object) -> None:
+        self.artefact = artefact
+
+    def export(self, tree: object, options: object, figures: object) -> Any:
+        if isinstance(self.artefact, Exception):
+            raise self.artefact
+        return self.artefact
+
+
+@pytest.mark.parametrize(
+    "artefact",
+    [ZeroDivisionError("division by zero"), KeyError("x"), RecursionError(), OSError(28, "No space"), None, 7,
+     "half a pair: \ud800", Files({"../x": ""}), Files({"/x": ""}), Files({"a//b": ""}),
+     Files({"x": "\ud800"})],
+    ids=repr,
+)  # fmt: skip
+def test_a_plugin_that_fails_is_told_as_its_own_fault(
+    monkeypatch: pytest.MonkeyPatch, artefact: object
+) -> None:
+    install(monkeypatch, failing="strange.package:exporter")
+    monkeypatch.setattr(EntryPoint, "load", lambda self: Failing(artefact))
+    domain, problem = (DOMAINS / "household" / f"{name}.pddl" for name in ("domain", "look-for-soda"))
+    tree = bbtc.plan(domain, problem, target="0.5").tree
+    with pytest.raises(BbtcError) as error:
+        bbtc.export(tree, "failing")
+    assert code_of(error) == "BBT0703"
+    assert "the exporter failing (strange.package:exporter" in str(error.value)
+    assert "not of bbtc" in str(error.value)
 
 
 def test_options_are_typed_and_have_defaults() -> None:
