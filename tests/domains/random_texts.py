@@ -26,7 +26,7 @@ class _Writer:
         self.objects = {name: kind for name, kind in every.items() if name == "o1" or random.random() < 0.6}
         self.constants = [name for name in self.objects if random.random() < 0.5]
         # A predicate may have the name of a test.
-        unary = random.choice(["q"] * 8 + ["q", "q"])
+        unary = random.choice(["q"] * 8 + ["known", "unknown"])
         self.fluents = {"p": [], unary: ["a"], "r": [random.choice(["top", _EITHER, "object"])]}
         self.static = {"h": [], "fixed": ["top"]}
         self.derived = {
