@@ -77,9 +77,9 @@ class Lifted:
 
     types: dict[str, set[str]] = field(default_factory=dict)
     objects: dict[str, set[str]] = field(default_factory=dict)
+    predicates: dict[str, dict[str, set[str]]] = field(default_factory=dict)
+    external: set[str] = field(default_factory=set)
     functions: set[str] = field(default_factory=set)
-    predicates: dict[str, int] = field(default_factory=dict)
-    """How many arguments each declared predicate has."""
     actions: list[dict[str, Form]] = field(default_factory=list)
     rules: list[tuple[Form, dict[str, set[str]], Form]] = field(default_factory=list)
     init: list[Form] = field(default_factory=list)
@@ -98,11 +98,14 @@ class Lifted:
                 case ":constants" | ":objects":
                     self.objects.update(typed(rest))
                 case ":predicates":
-                    self.predicates.update((each[0], len(typed(each[1:]))) for each in rest)
+                    for each in rest:
+                        self.external.update([each[1][0]] if each[0] == "external" else [])
+                        name, *parameters = each[1] if each[0] == "external" else each
+                        self.predicates[name] = typed(parameters)
                 case ":functions":
                     self.functions.update(function[0] for function in rest)
                 case ":action":
-                    self.actions.append({"name": rest[0], **_fields(rest[1:])})
+                    self.actions.append({":name": rest[0], **_fields(rest[1:])})
                 case ":derived":
                     name, *parameters = rest[0]
                     self.rules.append(([name, *typed(parameters)], typed(parameters), rest[1]))
@@ -163,7 +166,7 @@ class Lifted:
     def is_fact(self, form: Form) -> bool:
         """Is ``(known a)`` a fact? It is where a predicate of that name has one argument; what stands in
         parentheses of its own is never an argument."""
-        return isinstance(form[1], str) and (form[1][0] == "?" or self.predicates.get(form[0]) == 1)
+        return isinstance(form[1], str) and (form[1][0] == "?" or len(self.predicates.get(form[0], ())) == 1)
 
     def effect(self, form: Form, bound: Mapping[str, str], world: World) -> Draws:
         """What an effect may do; its conditions are read in ``world``."""
@@ -285,7 +288,7 @@ class Lifted:
     def moves(self) -> dict[str, Move]:
         """Every action with arguments, by its name."""
         return {
-            f"{action['name']}({','.join(bound.values())})": Move(
+            f"{action[':name']}({','.join(bound.values())})": Move(
                 action.get(":precondition", []), action.get(":effect", []), bound
             )
             for action in self.actions
