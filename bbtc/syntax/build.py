@@ -183,7 +183,16 @@ class Builder:
 
     def predicate(self, children: list[Any]) -> ast.PredicateDeclaration:
         head, parameters, close = children
-        name = leaves.declared("predicate", _head_name(head))
+        name = leaves.declared("predicate", leaves.head_name(head))
+        return ast.PredicateDeclaration(name, parameters, False, between(head, close))
+
+    def predicate_equal(self, children: list[Any]) -> ast.PredicateDeclaration:
+        head, parameters, close = children
+        name = ast.Name("=", Span(SOURCE.get(), head.end - 1, head.end))
+        if sum(len(group.names) for group in parameters) != 2:
+            raise Misuse(
+                "BBT0228", "a predicate cannot be called `=`", name.span, "it is built in, of two terms"
+            )
         return ast.PredicateDeclaration(name, parameters, False, between(head, close))
 
     def predicate_flat(self, children: list[Any]) -> ast.PredicateDeclaration:
@@ -198,7 +207,7 @@ class Builder:
 
     def predicate_unknown(self, children: list[Any]) -> ast.PredicateDeclaration:
         unknown, head, parameters, _, close = children
-        name = leaves.declared("predicate", _head_name(head))
+        name = leaves.declared("predicate", leaves.head_name(head))
         return ast.PredicateDeclaration(name, parameters, True, between(unknown, close))
 
     def functions(self, children: list[Any]) -> ast.Functions:
@@ -209,7 +218,7 @@ class Builder:
         span = between(head, close)
         if types:
             span = Span(span.source, span.start, types[0][1].end)
-        name = leaves.declared("function", _head_name(head))
+        name = leaves.declared("function", leaves.head_name(head))
         return ast.FunctionDeclaration(name, parameters, types[0][0] if types else (), span)
 
     def function_bare(self, children: list[Any]) -> ast.FunctionDeclaration:
@@ -287,7 +296,7 @@ class Builder:
         form, head, parameters, close, condition, end = children
         parameters = _parameters(parameters, end)
         args = tuple(name for group in parameters for name in group.names)
-        atom = ast.Atom(leaves.declared("predicate", _head_name(head)), args, between(head, close))
+        atom = ast.Atom(leaves.declared("predicate", leaves.head_name(head)), args, between(head, close))
         kind: Any = "axiom" if form.kind == "AXIOM" else "derived"
         return ast.Derived(
             "derived" if kind == "axiom" else kind, parameters, atom, condition, between(form, end)
@@ -575,14 +584,6 @@ class Builder:
 
     def unsupported_section(self, children: list[Any]) -> ast.Unsupported:
         return _unsupported(_keyword(children[0]), children[0], children[-1])
-
-
-def _head_name(head: Token) -> ast.Name:
-    """The name in a ``(name`` terminal."""
-    return ast.Name(
-        head.text[1:].strip(),
-        Span(SOURCE.get(), (head.end or 0) - len(head.text[1:].strip()), head.end or 0),
-    )
 
 
 def _spliced(children: Iterable[Any]) -> tuple[Any, ...]:

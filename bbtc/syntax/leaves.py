@@ -159,6 +159,12 @@ def atom(token: Token) -> Atom:
     return Atom(name(token), (), of(token))
 
 
+def head_name(head: Token) -> Name:
+    """The name in a ``(name`` terminal."""
+    text = head.text[1:].strip()
+    return Name(text, Span(SOURCE.get(), head.end - len(text), head.end))
+
+
 def declared(kind: str, word: Name) -> Name:
     """The name of what is declared. Raises :class:`Misuse` for one that no use could have, since it heads a
     form of the language: ``(and a)`` is no fact of a predicate ``and``."""

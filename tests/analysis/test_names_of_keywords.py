@@ -123,3 +123,18 @@ def test_a_function_a_template_or_an_object_means_the_same_whatever_its_name_or_
         assert _figures(_of(text, word).replace(f"({word}) (start)", "(start)")) == _figures(_of(text, "w"))
     elif kind != "function" or word not in {"total-cost", "reward"}:
         assert _figures(_of(text, word)) == _figures(_of(text, "w"))
+
+
+_EQUAL = """
+(define (domain d) (:predicates (= ?x ?y) (at ?x))
+  (:action go :parameters (?x ?y) :precondition (and (at ?x) (not (= ?x ?y))) :effect (at ?y)))
+(define (problem q) (:domain d) (:objects a b) (:init (at a)) (:goal (at b)))
+"""
+
+
+def test_equality_may_be_declared_as_what_it_is() -> None:
+    assert _figures(_EQUAL) == _figures(_EQUAL.replace("(= ?x ?y) (at ?x)", "(at ?x)"))
+    assert _figures(format_source(SourceFile("equal.pddl", _EQUAL))) == _figures(_EQUAL)
+    with pytest.raises(BbtcError) as raised:
+        _figures(_EQUAL.replace("(= ?x ?y) (at ?x)", "(= ?x) (at ?x)"))
+    assert [each.code for each in raised.value.diagnostics] == ["BBT0228"]

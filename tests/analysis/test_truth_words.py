@@ -111,3 +111,16 @@ def test_a_test_sets_no_fact(place: str, said: str) -> None:
     with pytest.raises(BbtcError) as raised:
         compile_sources([SourceFile("words.pddl", text)], Report(), Limits())
     assert all(each.severity is Severity.ERROR for each in raised.value.diagnostics)
+
+
+def _missing(text: str) -> list[str]:
+    return [each.message for each in check(model_of(text)) if each.code == "BBT0311"]
+
+
+def test_only_a_test_needs_the_requirement() -> None:
+    wanted = "(:requirements :typing :negative-preconditions :conditional-effects :probabilistic-effects)"
+    text = _watch(_KNOWN, "(known lamp)").replace("(:types", f"{wanted} (:types")
+    assert _missing(text) == []
+    tested = text.replace(":precondition (not", ":precondition (and (known (lamp)) (not", 1)
+    tested = tested.replace("(seen ?t))  :effect", "(seen ?t)))  :effect", 1)
+    assert any("`:unknown`" in message for message in _missing(tested))
