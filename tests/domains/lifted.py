@@ -25,6 +25,7 @@ Change = dict[Fact, int]
 Binding = dict[str, str]
 Draws = list[tuple[Fraction, Change, Fraction]]
 """What may happen: with its probability, and what it adds to the cost."""
+Result: TypeAlias = tuple[Fraction, dict[State, Fraction]]
 _MOST_DRAWS = 1000
 _MOST_STATES = 300
 _NOTHING: Draws = [(Fraction(1), {}, Fraction(0))]
@@ -295,15 +296,16 @@ class Lifted:
             for bound in self.bindings(typed(action.get(":parameters", [])), {})
         }
 
-    def after(self, move: Move, world: World, state: State) -> tuple[Fraction, dict[State, Fraction]]:
-        """What an action costs on average, and what it leads to."""
-        draws = move.draws
-        if draws is None:
-            draws = self.effect(move.effect, move.bound, world)
+    def after(self, move: Move, state: State) -> Result:
+        """What an action costs on average, and what it leads to; remembered."""
+        if state not in move.results:
+            draws = move.draws or self.effect(move.effect, move.bound, self.world(state))
             if "'when'" not in str(move.effect):
                 move.draws = draws
-        cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
-        return cost, _states((p, {**dict(state), **change}) for p, change, _ in draws)
+            cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
+            facts = dict(state)
+            move.results[state] = cost, _states((p, {**facts, **change}) for p, change, _ in draws)
+        return move.results[state]
 
     def world(self, state: State) -> World:
         """:meth:`derived`, remembered."""
@@ -325,7 +327,7 @@ class Lifted:
             choices.append(own)
             for move in () if goals[-1] else self.moves.values():
                 if self.value(move.needs, move.bound, world) == 2:
-                    cost, found = self.after(move, world, state)
+                    cost, found = self.after(move, state)
                     for each in found:
                         if each not in number:
                             number[each] = len(states)
@@ -344,6 +346,7 @@ class Move:
     effect: Form
     bound: Binding
     draws: Draws | None = None
+    results: dict[State, Result] = field(default_factory=dict)
 
 
 class Space:
