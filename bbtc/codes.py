@@ -58,6 +58,8 @@ CODES: dict[str, str] = {
     "BBT0224": "foreach without a node around it",
     "BBT0225": "name that is not declared",
     "BBT0226": "section given twice",
+    "BBT0227": "predicate with the name of a test",
+    "BBT0228": "name with a meaning of its own",
     # 03xx: checks
     "BBT0301": "unused predicate",
     "BBT0302": "unreachable action",

@@ -23,6 +23,7 @@ from bbtc.model import effect as me
 from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
 from bbtc.source import Span
+from bbtc.syntax.words import TEST_WORDS
 
 _SHORTFALL = Fraction(1, 100)
 """A no-change remainder of this probability or less is likely a slip of the pen."""
@@ -124,6 +125,15 @@ def _never_unknown(model: md.Model) -> Iterator[Diagnostic]:
                 if predicate.derived
                 else f"no `(unknown ({name} …))` stands in `:init` or in an effect that can happen",
             )
+
+
+def _test_words(model: md.Model) -> Iterator[Diagnostic]:
+    for name in sorted(TEST_WORDS & model.predicates.keys()):
+        predicate = model.predicates[name]
+        theirs = f"`({name} a)` is a fact of it, " if len(predicate.parameters) == 1 else ""
+        message = f"the predicate `{name}` has the name of a test"
+        hint = f"{theirs}`({name} (p))` tests the fact `(p)`"
+        yield Diagnostic("BBT0227", message, predicate.span, hint, Severity.NOTE)
 
 
 def _set_to(model: md.Model, *, unknown: bool) -> set[str]:
@@ -379,6 +389,7 @@ def _unused_templates(model: md.Model) -> Iterator[Diagnostic]:
 
 
 CHECKS = (
+    Check("BBT0227", _test_words),
     Check("BBT0218", _never_unknown, needs_problem=True),
     Check("BBT0301", _unused_predicates),
     Check("BBT0301", _unread_predicates, needs_problem=True),

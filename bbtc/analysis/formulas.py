@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from typing_extensions import assert_never
 
-from bbtc.analysis.names import TRUTH_WORDS, Names, Scope, nearest
+from bbtc.analysis import truth_words
+from bbtc.analysis.names import Names, Scope, nearest
 from bbtc.diagnostics import Related
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -16,6 +17,7 @@ from bbtc.model.types import Parameter
 from bbtc.rounding import decimal, too_long
 from bbtc.source import Span
 from bbtc.syntax import ast
+from bbtc.syntax.words import TEST_WORDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -68,7 +70,7 @@ def _predicate_args(
 ) -> tuple[mf.Term, ...] | None:
     predicate = names.predicate(name, args)
     if predicate is None:
-        for arg in args if name.key not in TRUTH_WORDS else ():
+        for arg in args if name.key not in TEST_WORDS else ():
             names.term(arg, scope)
         return None
     return names.arguments("predicate", name, predicate, args, scope, span=span)
@@ -78,6 +80,9 @@ def formula(names: Names, node: ast.Formula, scope: Scope) -> mf.Formula:
     """A condition; parts with errors, which are reported, count as true."""
     match node:
         case ast.Atom():
+            test = truth_words.tested(names, node)
+            if test is not None:
+                return formula(names, test, scope)
             return names.type_test(node, scope) or atom(names, node, scope) or mf.ALWAYS
         case ast.Empty():
             return mf.ALWAYS
@@ -115,11 +120,8 @@ def effect(names: Names, node: ast.Effect, scope: Scope) -> me.Effect:
     match node:
         case ast.Empty():
             return me.NOTHING
-        case ast.Assign(target, value, span):
-            args = _predicate_args(names, target.predicate, target.args, target.span, scope)
-            if args is None or _is_derived(names, target):
-                return me.NOTHING
-            return me.Set(target.predicate.key, args, value, span)
+        case ast.Assign():
+            return _setting(names, node, scope)
         case ast.EffectAnd(parts, span):
             return me.Together(tuple(effect(names, p, scope) for p in parts), span)
         case ast.When(condition, inner, span):
@@ -142,6 +144,17 @@ def effect(names: Names, node: ast.Effect, scope: Scope) -> me.Effect:
             return me.NOTHING
         case _:
             assert_never(node)
+
+
+def _setting(names: Names, node: ast.Assign, scope: Scope) -> me.Effect:
+    assigned = truth_words.assigned(names, node)
+    if assigned is None:
+        return me.NOTHING
+    target = assigned.atom
+    args = _predicate_args(names, target.predicate, target.args, target.span, scope)
+    if args is None or _is_derived(names, target):
+        return me.NOTHING
+    return me.Set(target.predicate.key, args, assigned.value, assigned.span)
 
 
 def _is_derived(names: Names, target: ast.Atom) -> bool:

@@ -6,9 +6,10 @@ from fractions import Fraction
 
 from typing_extensions import assert_never
 
-from bbtc.analysis import formulas
+from bbtc.analysis import formulas, truth_words
 from bbtc.analysis.names import Names
 from bbtc.diagnostics import Related
+from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -64,9 +65,16 @@ class _Reader:
             case _:
                 assert_never(element)
 
-    def _fact(self, element: ast.Assign) -> None:
-        atom = formulas.atom(self.names, element.atom, {})
-        if atom is None:
+    def _fact(self, given: ast.Assign) -> None:
+        test = truth_words.tested(self.names, given.atom)
+        if test is not None and given.value is Truth.FALSE:
+            # As with the parentheses that it lacks: uncertain, and refused as such.
+            denied = formulas.formula(self.names, ast.Not(test, given.span), {})
+            self.clauses.append(md.InitialClause(denied, False, given.span))
+            return
+        element = truth_words.assigned(self.names, given)
+        atom = None if element is None else formulas.atom(self.names, element.atom, {})
+        if element is None or atom is None:
             return
         key = (atom.predicate, atom.args)
         fact = md.InitialFact(atom.predicate, atom.args, element.value, element.span)

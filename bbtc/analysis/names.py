@@ -15,10 +15,9 @@ from bbtc.model.formula import Equal, Formula, Quantified, Term
 from bbtc.model.types import OBJECT, Object, Parameter, Type, TypeHierarchy
 from bbtc.source import Span
 from bbtc.syntax import ast
+from bbtc.syntax.words import TEST_WORDS
 
 Scope = Mapping[str, Parameter]
-TRUTH_WORDS = frozenset({"known", "unknown"})
-"""Words that stand before a fact in parentheses."""
 _NO_TYPE = ""
 """Stands for a type that is not known, which has been reported: it fits everything."""
 _TOLD = 10
@@ -209,7 +208,9 @@ class Names:
     def _no_predicate(self, key: str, args: Sequence[ast.Term]) -> str | None:
         """What is meant by a name that has the place of a predicate and is a function, or a word of the
         language that lacks the parentheses within."""
-        if key in TRUTH_WORDS and args:
+        if key in TEST_WORDS and args:
+            if isinstance(args[0], ast.Variable):
+                return f"`({key} (p …))` tests a fact; a predicate of this name needs a declaration"
             return f"write `({key} ({' '.join(arg.text for arg in args[:8])}))`"
         if key in self.functions:
             return f"`{key}` is a function, whose values are numbers: `(= ({key}{' …' if args else ''}) 1)`"

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from typing_extensions import assert_never
 
-from bbtc.analysis import bodies, facts, formulas
+from bbtc.analysis import bodies, facts, formulas, truth_words
 from bbtc.analysis.declare import declare, sections
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
@@ -282,7 +282,9 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
     init = initial(names, list(sections(problem, ast.Init)))
     for hidden in sections(problem, ast.Hidden):
         for fact in hidden.facts:
-            formulas.atom(names, fact.atom, {})
+            assigned = truth_words.assigned(names, fact)
+            if assigned is not None:
+                formulas.atom(names, assigned.atom, {})
     goal, goal_span = _goal(names, model, problem)
     probability, reward = Fraction(1), Fraction(0)
     for number in sections(problem, ast.GoalNumber):

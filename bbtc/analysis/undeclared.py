@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 
 from bbtc.syntax import ast
+from bbtc.syntax.words import TEST_WORDS
 
 _DIGITS = re.compile(r"\d+")
 _LONG = 8
@@ -57,6 +58,9 @@ def uses_of(definitions: Iterable[ast.Definition]) -> Uses:
                         bound.update(name.key for name in node.types)
                 case _:
                     given.add(node.atom.predicate.key)
+                    if node.atom.predicate.key in TEST_WORDS:
+                        # `(unknown p)` may be short for `(unknown (p))`.
+                        given.update(arg.key for arg in node.atom.args)
     return Uses(names, types, frozenset(bound), frozenset(given))
 
 

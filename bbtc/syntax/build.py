@@ -183,20 +183,32 @@ class Builder:
 
     def predicate(self, children: list[Any]) -> ast.PredicateDeclaration:
         head, parameters, close = children
-        return ast.PredicateDeclaration(_head_name(head), parameters, False, between(head, close))
+        name = leaves.declared("predicate", leaves.head_name(head))
+        return ast.PredicateDeclaration(name, parameters, False, between(head, close))
+
+    def predicate_equal(self, children: list[Any]) -> ast.PredicateDeclaration:
+        head, parameters, close = children
+        name = ast.Name("=", Span(SOURCE.get(), head.end - 1, head.end))
+        if sum(len(group.names) for group in parameters) != 2:
+            raise Misuse(
+                "BBT0228", "a predicate cannot be called `=`", name.span, "it is built in, of two terms"
+            )
+        return ast.PredicateDeclaration(name, parameters, False, between(head, close))
 
     def predicate_flat(self, children: list[Any]) -> ast.PredicateDeclaration:
         token = children[0]
         found = _WORD.search(token.text, 1)
         assert found is not None
         start = token.start + found.start()
-        name = ast.Name(found.group(), Span(SOURCE.get(), start, start + len(found.group())))
+        word = ast.Name(found.group(), Span(SOURCE.get(), start, start + len(found.group())))
+        name = leaves.declared("predicate", word)
         entries = leaves.groups(token.text[found.end() : -1], token.start + found.end(), variables=True)
         return ast.PredicateDeclaration(name, entries, False, of(token))
 
     def predicate_unknown(self, children: list[Any]) -> ast.PredicateDeclaration:
         unknown, head, parameters, _, close = children
-        return ast.PredicateDeclaration(_head_name(head), parameters, True, between(unknown, close))
+        name = leaves.declared("predicate", leaves.head_name(head))
+        return ast.PredicateDeclaration(name, parameters, True, between(unknown, close))
 
     def functions(self, children: list[Any]) -> ast.Functions:
         return ast.Functions(tuple(children[1:-1]), between(children[0], children[-1]))
@@ -206,12 +218,14 @@ class Builder:
         span = between(head, close)
         if types:
             span = Span(span.source, span.start, types[0][1].end)
-        return ast.FunctionDeclaration(_head_name(head), parameters, types[0][0] if types else (), span)
+        name = leaves.declared("function", leaves.head_name(head))
+        return ast.FunctionDeclaration(name, parameters, types[0][0] if types else (), span)
 
     def function_bare(self, children: list[Any]) -> ast.FunctionDeclaration:
         name, *types = children
         span = of(name) if not types else Span(SOURCE.get(), name.start, types[0][1].end)
-        return ast.FunctionDeclaration(leaves.name(name), (), types[0][0] if types else (), span)
+        declared = leaves.declared("function", leaves.name(name))
+        return ast.FunctionDeclaration(declared, (), types[0][0] if types else (), span)
 
     # --- actions and the like ----------------------------------------------------------------
 
@@ -231,7 +245,7 @@ class Builder:
         head, name, *given, close = children
         fields = _fields(given)
         return ast.Template(
-            leaves.name(name),
+            leaves.declared("template", leaves.name(name)),
             _parameters(_value(fields, "parameters") or (), close),
             _value(fields, "precondition"),
             _value(fields, "effect"),
@@ -282,7 +296,7 @@ class Builder:
         form, head, parameters, close, condition, end = children
         parameters = _parameters(parameters, end)
         args = tuple(name for group in parameters for name in group.names)
-        atom = ast.Atom(_head_name(head), args, between(head, close))
+        atom = ast.Atom(leaves.declared("predicate", leaves.head_name(head)), args, between(head, close))
         kind: Any = "axiom" if form.kind == "AXIOM" else "derived"
         return ast.Derived(
             "derived" if kind == "axiom" else kind, parameters, atom, condition, between(form, end)
@@ -570,14 +584,6 @@ class Builder:
 
     def unsupported_section(self, children: list[Any]) -> ast.Unsupported:
         return _unsupported(_keyword(children[0]), children[0], children[-1])
-
-
-def _head_name(head: Token) -> ast.Name:
-    """The name in a ``(name`` terminal."""
-    return ast.Name(
-        head.text[1:].strip(),
-        Span(SOURCE.get(), (head.end or 0) - len(head.text[1:].strip()), head.end or 0),
-    )
 
 
 def _spliced(children: Iterable[Any]) -> tuple[Any, ...]:

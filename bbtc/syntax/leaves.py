@@ -30,6 +30,7 @@ from bbtc.syntax.ast import (
 )
 from bbtc.syntax.engine import Token
 from bbtc.syntax.scan import without_comments
+from bbtc.syntax.words import BODY_WORDS, FORM_WORDS
 
 SOURCE: ContextVar[SourceFile] = ContextVar("SOURCE")
 """The file that is being parsed: the builder's functions keep no state, but spans need it."""
@@ -57,14 +58,6 @@ _ENTRY = re.compile(r"-|\??(?:[^\s()?-]|-+(?=[^\s()?-]))+|\?")
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 # A fact whose words stand one space apart, any fact, or the value of a fluent.
 _FACT = re.compile(r"\(([^\s()]+(?: [^\s()]+)*)\)|(\([^()]*\))|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
-
-# Words that head a form, and no flat atom: _ATOM_HEAD in the grammar.
-_HEADS = frozenset(
-    (
-        *("and", "or", "not", "imply", "when", "forall", "exists", "oneof", "probabilistic", "either"),
-        *("increase", "decrease", "assign", "scale-up", "scale-down", "preference"),
-    )
-)
 
 NUMBER_LENGTH = 200
 """Longest number, in characters."""
@@ -166,9 +159,24 @@ def atom(token: Token) -> Atom:
     return Atom(name(token), (), of(token))
 
 
+def head_name(head: Token) -> Name:
+    """The name in a ``(name`` terminal."""
+    text = head.text[1:].strip()
+    return Name(text, Span(SOURCE.get(), head.end - len(text), head.end))
+
+
+def declared(kind: str, word: Name) -> Name:
+    """The name of what is declared. Raises :class:`Misuse` for one that no use could have, since it heads a
+    form of the language: ``(and a)`` is no fact of a predicate ``and``."""
+    if word.key in (BODY_WORDS if kind == "template" else FORM_WORDS):
+        hint = f"`({word.key} …)` has a meaning of its own; choose another name"
+        raise Misuse("BBT0228", f"a {kind} cannot be called `{word.text}`", word.span, hint)
+    return word
+
+
 def refuse_head(text: str, span: Span, expected: str) -> None:
     """Raise :class:`Misuse` for a bare word that heads a form: printing it would turn it into one."""
-    if text.lower() in _HEADS:
+    if text.lower() in FORM_WORDS:
         hint = f"its parts stand with it in parentheses: `({text.lower()} …)`"
         raise Misuse("BBT0101", f"expected {expected}, found `{text}`", span, hint)
 

@@ -25,6 +25,7 @@ Change = dict[Fact, int]
 Binding = dict[str, str]
 Draws = list[tuple[Fraction, Change, Fraction]]
 """What may happen: with its probability, and what it adds to the cost."""
+Result: TypeAlias = tuple[Fraction, dict[State, Fraction]]
 _MOST_DRAWS = 1000
 _MOST_STATES = 300
 _NOTHING: Draws = [(Fraction(1), {}, Fraction(0))]
@@ -77,9 +78,9 @@ class Lifted:
 
     types: dict[str, set[str]] = field(default_factory=dict)
     objects: dict[str, set[str]] = field(default_factory=dict)
+    predicates: dict[str, dict[str, set[str]]] = field(default_factory=dict)
+    external: set[str] = field(default_factory=set)
     functions: set[str] = field(default_factory=set)
-    predicates: dict[str, int] = field(default_factory=dict)
-    """How many arguments each declared predicate has."""
     actions: list[dict[str, Form]] = field(default_factory=list)
     rules: list[tuple[Form, dict[str, set[str]], Form]] = field(default_factory=list)
     init: list[Form] = field(default_factory=list)
@@ -98,11 +99,14 @@ class Lifted:
                 case ":constants" | ":objects":
                     self.objects.update(typed(rest))
                 case ":predicates":
-                    self.predicates.update((each[0], len(typed(each[1:]))) for each in rest)
+                    for each in rest:
+                        self.external.update([each[1][0]] if each[0] == "external" else [])
+                        name, *parameters = each[1] if each[0] == "external" else each
+                        self.predicates[name] = typed(parameters)
                 case ":functions":
                     self.functions.update(function[0] for function in rest)
                 case ":action":
-                    self.actions.append({"name": rest[0], **_fields(rest[1:])})
+                    self.actions.append({":name": rest[0], **_fields(rest[1:])})
                 case ":derived":
                     name, *parameters = rest[0]
                     self.rules.append(([name, *typed(parameters)], typed(parameters), rest[1]))
@@ -163,7 +167,7 @@ class Lifted:
     def is_fact(self, form: Form) -> bool:
         """Is ``(known a)`` a fact? It is where a predicate of that name has one argument; what stands in
         parentheses of its own is never an argument."""
-        return isinstance(form[1], str) and (form[1][0] == "?" or self.predicates.get(form[0]) == 1)
+        return isinstance(form[1], str) and (form[1][0] == "?" or len(self.predicates.get(form[0], ())) == 1)
 
     def effect(self, form: Form, bound: Mapping[str, str], world: World) -> Draws:
         """What an effect may do; its conditions are read in ``world``."""
@@ -285,22 +289,23 @@ class Lifted:
     def moves(self) -> dict[str, Move]:
         """Every action with arguments, by its name."""
         return {
-            f"{action['name']}({','.join(bound.values())})": Move(
+            f"{action[':name']}({','.join(bound.values())})": Move(
                 action.get(":precondition", []), action.get(":effect", []), bound
             )
             for action in self.actions
             for bound in self.bindings(typed(action.get(":parameters", [])), {})
         }
 
-    def after(self, move: Move, world: World, state: State) -> tuple[Fraction, dict[State, Fraction]]:
-        """What an action costs on average, and what it leads to."""
-        draws = move.draws
-        if draws is None:
-            draws = self.effect(move.effect, move.bound, world)
+    def after(self, move: Move, state: State) -> Result:
+        """What an action costs on average, and what it leads to; remembered."""
+        if state not in move.results:
+            draws = move.draws or self.effect(move.effect, move.bound, self.world(state))
             if "'when'" not in str(move.effect):
                 move.draws = draws
-        cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
-        return cost, _states((p, {**dict(state), **change}) for p, change, _ in draws)
+            cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
+            facts = dict(state)
+            move.results[state] = cost, _states((p, {**facts, **change}) for p, change, _ in draws)
+        return move.results[state]
 
     def world(self, state: State) -> World:
         """:meth:`derived`, remembered."""
@@ -322,7 +327,7 @@ class Lifted:
             choices.append(own)
             for move in () if goals[-1] else self.moves.values():
                 if self.value(move.needs, move.bound, world) == 2:
-                    cost, found = self.after(move, world, state)
+                    cost, found = self.after(move, state)
                     for each in found:
                         if each not in number:
                             number[each] = len(states)
@@ -341,6 +346,7 @@ class Move:
     effect: Form
     bound: Binding
     draws: Draws | None = None
+    results: dict[State, Result] = field(default_factory=dict)
 
 
 class Space:

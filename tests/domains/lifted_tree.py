@@ -134,7 +134,7 @@ class TreeOnText:
         move = lifted.moves[ticked["action"]]
         if lifted.value(move.needs, move.bound, world) != 2:
             found.faults.append(f"{ticked['action']} starts in {sorted(point.state)}")
-        cost, states = lifted.after(move, world, point.state)
+        cost, states = lifted.after(move, point.state)
         found.cost += p * cost
         finished = point.finished | {ticked["id"]} if ticked["latched"] else point.finished
         tries = dict(point.tries)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from random import Random
 
 _ABOVE = {
@@ -26,7 +27,7 @@ class _Writer:
         self.objects = {name: kind for name, kind in every.items() if name == "o1" or random.random() < 0.6}
         self.constants = [name for name in self.objects if random.random() < 0.5]
         # A predicate may have the name of a test.
-        unary = random.choice(["q"] * 8 + ["q", "q"])
+        unary = random.choice(["q"] * 8 + ["known", "unknown"])
         self.fluents = {"p": [], unary: ["a"], "r": [random.choice(["top", _EITHER, "object"])]}
         self.static = {"h": [], "fixed": ["top"]}
         self.derived = {
@@ -36,7 +37,6 @@ class _Writer:
         }
         self.unary = unary
         self.callable: dict[str, list[str]] = {}
-        self.changed: list[str] = []
         self.declared = {**self.fluents, **self.static, **self.derived}
         self.cost = random.choice(["total-cost", "fuel", ""])
 
@@ -111,7 +111,6 @@ class _Writer:
         drawn = self.random.random()
         if depth <= 0 or drawn < 0.4:
             atom = self.atom(scope, self.fluents)
-            self.changed.append(atom)
             if self.cost and priced and drawn < 0.1:
                 return self.increase()
             return self.among(atom, atom, f"(not {atom})", f"(unknown {atom})")
@@ -129,6 +128,7 @@ class _Writer:
 
     def action(self, name: str) -> str:
         listed, scope = self.parameters("?x ?y", 2)
+        self.callable[name] = list(scope.values())
         atom, other = self.atom(scope, self.fluents), self.atom(scope, {**self.static, **self.derived})
         plain = self.among(
             "()", f"(not {atom})", atom, f"(unknown {atom})", f"(and (not {atom}) (not {other}))"
@@ -141,7 +141,6 @@ class _Writer:
         effects = " ".join(self.effect(scope, 3) for _ in range(self.random.randint(1, 3)))
         if self.cost:
             effects += f" (increase ({self.cost}) {self.among(*_AMOUNTS)})"
-        self.callable[name] = list(scope.values())
             if self.random.random() < 0.6:
                 read = self.atom(scope, self.fluents)
                 read = self.among(
@@ -273,11 +272,12 @@ class _Writer:
         """Does a fact stand beside its like with another value?"""
         return fact.startswith("(unknown (") and any(fact[9:-1] in other for other in given)
 
-    def within_reach(self, objects: list[str]) -> str:
-        """A fact that some action sets, perhaps, with any objects for its parameters."""
-        if not self.changed:
+    def within_reach(self, actions: list[str], objects: list[str]) -> str:
+        """A fact that some action names, with any objects for its parameters."""
+        changed = re.findall(rf"\(((?:{'|'.join(self.fluents)})\b[^()]*)\)", " ".join(actions), re.IGNORECASE)
+        if not changed:
             return self.atom({}, self.fluents, objects)
-        name, *args = self.random.choice(self.changed)[1:-1].split()
+        name, *args = self.random.choice(changed).split()
         kinds = self.fluents[name.lower()]
         found = [
             [arg] if arg in objects else self.terms({}, kind, objects)
@@ -297,7 +297,7 @@ class _Writer:
         count = self.random.choice([0, 0, 1, 2])
         templates = [self.template(name) for name in ["first", "second"][:count]]
         every = list(self.objects)
-        atom, goal = self.within_reach(every), self.condition({}, 1, self.declared, every)
+        atom, goal = self.within_reach(actions, every), self.condition({}, 1, self.declared, every)
         goal = self.among(
             *(atom, atom, f"(and {atom} {goal})", f"(and {goal} {atom})", f"(or {atom} {goal})", goal),
             *(self.tested(self.read({}, every)), f"(and {atom} {self.tested(self.read({}, every))})"),

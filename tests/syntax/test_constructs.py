@@ -96,7 +96,7 @@ CONDITIONS: dict[str, ast.Formula] = {
     "(forall (?x) (p ?x))": ast.Quantified("forall", (group("?x"),), atom("p ?x"), S),
     "(forall () (p))": ast.Quantified("forall", (), atom("p"), S),
     "(unknown (p a))": ast.Test("unknown", atom("p a"), S),
-    "(known p)": ast.Test("known", atom("p"), S),
+    "(known p)": atom("known p"),  # the test of `(p)`, unless a predicate `known` is declared
     "(not (known (p ?x)))": ast.Not(ast.Test("known", atom("p ?x"), S), S),
     "(known ?x)": atom("known ?x"),
     "(unknown a b)": atom("unknown a b"),
@@ -117,7 +117,8 @@ EFFECTS: dict[str, ast.Effect] = {
     "(not (p a))": false("p a"),
     "(not p)": false("p"),
     "(unknown (p a))": unknown("p a"),
-    "(and (p) (not (q)) (unknown r))": ast.EffectAnd((true("p"), false("q"), unknown("r")), S),
+    "(and (p) (not (q)) (unknown (r)))": ast.EffectAnd((true("p"), false("q"), unknown("r")), S),
+    "(and (p) (unknown r))": ast.EffectAnd((true("p"), true("unknown r")), S),
     "(when (p) (not (q)))": ast.When(atom("p"), false("q"), S),
     "(when (and (p) (q)) (and (r) (s)))": ast.When(
         ast.And((atom("p"), atom("q")), S), ast.EffectAnd((true("r"), true("s")), S), S

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
 from bbtc.syntax import ast
-from bbtc.syntax.hints import CONNECTIVES
+from bbtc.syntax.words import BODY_WORDS, FORM_WORDS
 
 S = Span(SourceFile("none", ""), 0, 0)
 
@@ -26,13 +26,15 @@ _ODD = [
     "number",
     "object",
     "e5",
+    "known",
+    "unknown",
 ]
-_RESERVED = {*CONNECTIVES, "either", "scale-up", "scale-down", "invariant"}
-_BODIES = {"sequence", "fallback", "skipper", "condition", "action", "foreach"}
+_RESERVED = {*FORM_WORDS, "invariant"}
 WORDS = st.one_of(
     st.sampled_from(_ODD), st.from_regex(r"\A[A-Za-z_][A-Za-z0-9_.*+@#$%!~-]{0,8}[A-Za-z0-9_]\Z")
 ).filter(lambda word: word.lower() not in _RESERVED)
 names = WORDS.map(lambda text: ast.Name(text, S))
+_template_names = names.filter(lambda name: name.key not in BODY_WORDS)
 # An object in an equation must not look like a number.
 objects = st.from_regex(r"\A[A-Za-z_][a-z0-9]{0,5}\Z").map(lambda text: ast.Name(text, S))
 variables = WORDS.map(lambda text: ast.Variable(f"?{text}", S))
@@ -143,7 +145,7 @@ initial = st.recursive(
     lambda inner: build(ast.InitAnd, tuples(inner)),
     max_leaves=4,
 )
-calls = WORDS.filter(lambda word: word.lower() not in _BODIES).map(lambda text: ast.Name(text, S))
+calls = WORDS.filter(lambda word: word.lower() not in BODY_WORDS).map(lambda text: ast.Name(text, S))
 bodies = st.recursive(
     st.one_of(
         build(ast.BodyCondition, formulas),
@@ -186,7 +188,9 @@ sections = st.one_of(
         optional(observations),
         optional(effects),
     ),
-    build(ast.Template, names, typed_lists(parameters), optional(formulas), optional(effects), bodies),
+    build(
+        ast.Template, _template_names, typed_lists(parameters), optional(formulas), optional(effects), bodies
+    ),
     build(ast.Sensor, names, typed_lists(parameters), optional(formulas), formulas),
     st.builds(_derived, typed_lists(parameters), names, formulas),
     build(ast.Derived, st.just("axiom"), typed_lists(parameters), atoms, formulas),

@@ -1,0 +1,11 @@
+(define (domain gates)
+  (:predicates (open ?g) (or ?a ?b) (unknown (not)))
+  (:functions (when ?g))
+  (:derived (and ?g) (open ?g))
+  (:template condition :body (sequence (look)))
+  (:action look :effect (open first)))
+
+(define (problem shut)
+  (:domain gates)
+  (:objects first)
+  (:goal (open first)))
