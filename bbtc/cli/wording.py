@@ -164,7 +164,7 @@ def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> lis
         if not whys:
             node, condition = each.stop.node or tree.root.id, each.stop.condition
             what = _stopped(tree, node, condition, status if each.stop.status is None else each.stop.status)
-            whys = [f"{what}, node {node}: the tree has nothing left to try"]
+            whys = [f"{what}, node {node}: the goal may be in reach, but the tree has nothing left to try"]
         lines.append(f"  {exact(each.run.probability)}{ending}: {whys[0]}")
         lines.extend(f"    and {why}" for why in whys[1:])
         lines.extend(f"    {line}" for line in _steps(tree, each.run))
