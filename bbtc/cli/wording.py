@@ -34,6 +34,7 @@ __all__ = [
     "refinement_line",
     "run_lines",
     "simplified_line",
+    "steps_of",
     "within",
 ]
 
@@ -167,7 +168,7 @@ def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> lis
             whys = [f"{what}, node {node}: the goal may be in reach, but the tree has nothing left to try"]
         lines.append(f"  {exact(each.run.probability)}{ending}: {whys[0]}")
         lines.extend(f"    and {why}" for why in whys[1:])
-        lines.extend(f"    {line}" for line in _steps(tree, each.run))
+        lines.extend(f"    {line}" for line in steps_of(tree, each.run))
     if rest and runs:
         lines.append(f"  {exact(rest)}: other runs")
     return lines
@@ -182,7 +183,7 @@ def run_lines(tree: Tree, run: Scenario) -> list[str]:
     ]
 
 
-def _steps(tree: Tree, run: Scenario) -> list[str]:
+def steps_of(tree: Tree, run: Scenario) -> list[str]:
     """The actions of a run; of very many, the last ones."""
     lines = run_lines(tree, run) or ["no action started"]
     left_out = len(lines) - _MOST_STEPS

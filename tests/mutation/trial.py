@@ -143,10 +143,10 @@ def tried(copies: Copies, mutant: Mutant, seconds: float) -> Tried:
     """What the tests say of a mutant. A status of pytest other than passed and failed (nothing collected,
     say) is an error of the trial, but for what fails while it is imported, which is noticed, too."""
     tests = selection(copies.project, mutant.file)
-    source = (copies.project.root / mutant.file).read_text("utf-8")
     begun = time.monotonic()
     with copies.one() as copy:
         path = copy / mutant.file
+        source = path.read_text("utf-8")
         path.write_text(mutant.applied(source), "utf-8")
         try:
             status, by = run_tests(copy, tests, seconds)
@@ -168,8 +168,8 @@ def try_all(
     trusted: bool = False,
 ) -> list[Tried]:
     """What became of each mutant, in their order. Raises ``RuntimeError`` if the tests fail without any: then
-    they would kill every mutant and say nothing. ``seconds`` None: the tests of a mutant may take as long as all
-    took without any, twice, and a minute. ``trusted``: the tests are known to pass."""
+    they would kill every mutant and say nothing. ``seconds`` None: the tests of a mutant may take as long as
+    all took without any, twice, and a minute. ``trusted``: the tests are known to pass."""
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copies = Copies(project, Path(folder), jobs)
         begun = time.monotonic()

@@ -89,6 +89,22 @@ def test_each_way_to_fail_is_told_with_the_fact_at_its_root(hospital: Path) -> N
     assert "failing runs" not in bbtc("simulate", str(hospital), "--failing", "0").out.decode()
 
 
+def test_planning_tells_the_same_of_a_target_out_of_reach(tmp_path: Path) -> None:
+    file = tmp_path / "hospital.pddl"
+    file.write_text(HOSPITAL.replace("GOAL", "(delivered)"))
+    told = bbtc("plan", str(file), "-q", "-o", str(tmp_path / "tree.json")).err.replace(f"{tmp_path}/", "")
+    lines = told.splitlines()
+    assert lines[2:8] == [
+        "  9/50 (0.18): after look(ward-1) [hospital.pddl:13:3], nothing can bring about delivered()",
+        "    hand-over(ward-1) [hospital.pddl:17:3] needs nurse-in(ward-1), and no action makes that true",
+        "    most probably so, 81/500 (0.162):",
+        "      drive(dock,hall): at(dock) = false, at(hall) = true",
+        "      drive(hall,ward-1): at(hall) = false, at(ward-1) = true",
+        "      look(ward-1): nurse-in(ward-1) = false",
+    ]
+    assert lines[8].startswith("  1/10 (0.1): after drive(dock,hall)")
+
+
 def test_a_blocked_run_names_the_empty_battery_and_not_the_fact_it_never_came_to_observe(
     tmp_path: Path,
 ) -> None:
@@ -96,10 +112,12 @@ def test_a_blocked_run_names_the_empty_battery_and_not_the_fact_it_never_came_to
     file = tmp_path / "hospital.pddl"
     file.write_text(HOSPITAL.replace("GOAL", "(or (delivered) (not (nurse-in ward-1)))"))
     done = bbtc("plan", str(file), "-o", str(tmp_path / "tree.json"), "-q")
-    assert done.err.replace(f"{tmp_path}/", "").splitlines()[-1] == (
-        "    drive(hall,ward-1) [hospital.pddl:8:3] needs charged(), and nothing brings it back: "
-        "charge() cannot without it"
-    )
+    battery = "needs charged(), and nothing brings it back: charge() cannot without it"
+    assert done.err.replace(f"{tmp_path}/", "").splitlines()[-3:] == [
+        f"    drive(hall,ward-1) [hospital.pddl:8:3] {battery}",
+        "    most probably so:",
+        "      drive(dock,hall): at(dock) = false, at(hall) = true, charged() = false",
+    ]
     told = bbtc("simulate", str(tmp_path / "tree.json")).out.decode()
     assert "nurse-in(ward-1) is unknown" in told, "the condition that the tree stopped at"
     assert told.splitlines()[-3:] == [
