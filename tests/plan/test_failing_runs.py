@@ -28,6 +28,7 @@ from tests.plan.test_refine import action, task
 from tests.strategies import trees
 
 T, F = Truth.TRUE, Truth.FALSE
+_NONE = "and no action of the tree makes that true"
 
 HOSPITAL = """; A robot brings medicine to the nurse of a ward. Driving may empty the battery, which only the
 ; dock charges, and whoever has an empty battery does not get there; the nurse may be away.
@@ -73,13 +74,13 @@ def test_each_way_to_fail_is_told_with_the_fact_at_its_root(hospital: Path) -> N
     text = done.out.decode()
     assert text[text.index("failing runs") :].splitlines() == [
         "failing runs, the most probable first:",
-        "  81/500 (0.162): hand-over(ward-1) needs nurse-in(ward-1), and no action makes that true",
+        f"  81/500 (0.162): hand-over(ward-1) needs nurse-in(ward-1), {_NONE}",
         "    drive(dock,hall): at(dock) = false, at(hall) = true",
         "    drive(hall,ward-1): at(hall) = false, at(ward-1) = true",
         "    look(ward-1): nurse-in(ward-1) = false",
-        "  1/10 (0.1): drive(hall,ward-1) needs charged(), and no action makes that true",
+        f"  1/10 (0.1): drive(hall,ward-1) needs charged(), {_NONE}",
         "    drive(dock,hall): at(dock) = false, at(hall) = true, charged() = false",
-        "  9/500 (0.018): hand-over(ward-1) needs nurse-in(ward-1), and no action makes that true",
+        f"  9/500 (0.018): hand-over(ward-1) needs nurse-in(ward-1), {_NONE}",
         "    drive(dock,hall): at(dock) = false, at(hall) = true",
         "    drive(hall,ward-1): at(hall) = false, at(ward-1) = true, charged() = false",
         "    look(ward-1): nurse-in(ward-1) = false",
@@ -112,7 +113,7 @@ def test_a_blocked_run_names_the_empty_battery_and_not_the_fact_it_never_came_to
     file = tmp_path / "hospital.pddl"
     file.write_text(HOSPITAL.replace("GOAL", "(or (delivered) (not (nurse-in ward-1)))"))
     done = bbtc("plan", str(file), "-o", str(tmp_path / "tree.json"), "-q")
-    battery = "needs charged(), and nothing brings it back: charge() cannot without it"
+    battery = "needs charged(), and no action brings it back: charge() cannot without it"
     assert done.err.replace(f"{tmp_path}/", "").splitlines()[-3:] == [
         f"    drive(hall,ward-1) [hospital.pddl:8:3] {battery}",
         "    most probably so:",
@@ -122,7 +123,7 @@ def test_a_blocked_run_names_the_empty_battery_and_not_the_fact_it_never_came_to
     assert "nurse-in(ward-1) is unknown" in told, "the condition that the tree stopped at"
     assert told.splitlines()[-3:] == [
         "failing runs, the most probable first:",
-        "  1/10 (0.1), blocked: drive(hall,ward-1) needs charged(), and no action makes that true",
+        f"  1/10 (0.1), blocked: drive(hall,ward-1) needs charged(), {_NONE}",
         "    drive(dock,hall): at(dock) = false, at(hall) = true, charged() = false",
     ]
 
@@ -172,7 +173,10 @@ def test_of_a_long_run_the_end_is_told(tmp_path: Path) -> None:
     bbtc("plan", str(file), "-q", "-o", str(tmp_path / "tree.json"))
     lines = bbtc("simulate", str(tmp_path / "tree.json")).out.decode().splitlines()
     start = lines.index("failing runs, the most probable first:")
-    assert lines[start + 1] == "  1/2 (0.5): last() needs not broken(), and no action makes that true"
+    assert (
+        lines[start + 1]
+        == "  1/2 (0.5): last() needs not broken(), and no action of the tree makes that true"
+    )
     assert lines[start + 2] == "    8 actions before, then"
     assert lines[start + 3].strip().startswith("a8():")
     assert lines[-1] == "    last(): broken() = true"
