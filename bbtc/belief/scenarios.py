@@ -50,7 +50,8 @@ _Path = tuple[int, "_Path | None"]  # last state, and the path before it
 def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterator[Scenario]:
     """Every scenario in order of decreasing probability (ties in breadth-first order of the
     states). Endless where the chain has loops: take as many as needed. Runs that never end are none.
-    ``failing``: only those that end without success, however rare they are among the others.
+    ``failing``: only those that end without success, however rare they are among the others (ties depth
+    first, so that the first of many comes soon).
 
     Raises :class:`bbtc.diagnostics.LimitReached` past the limits on states (here: of steps in runs) and
     time: of an action that nearly always fails and is tried again, each run is nearly as probable as the
@@ -60,11 +61,10 @@ def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterato
     best = _best_ends(chain, ends, limits) if failing else dict.fromkeys(_ending(chain, ends), Fraction(1))
     # By the best that a beginning may still become; of all runs, by what it is: each soon comes to an end.
     queue: list[tuple[Fraction, int, Fraction, _Path]] = []
-    count = 0
+    order = itertools.count(0, -1 if failing else 1)
     for probability, state in chain.initial:
         if state in best and probability:
-            heapq.heappush(queue, (-probability * best[state], count, probability, (state, None)))
-            count += 1
+            heapq.heappush(queue, (-probability * best[state], next(order), probability, (state, None)))
     for step in itertools.count():
         if not queue:
             return
@@ -78,8 +78,7 @@ def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterato
         for target, probability in _merged(chain, path[0]).items():
             if target in best:
                 now = reached * probability
-                heapq.heappush(queue, (-now * best[target], count, now, (target, path)))
-                count += 1
+                heapq.heappush(queue, (-now * best[target], next(order), now, (target, path)))
 
 
 def _merged(chain: Chain, state: int) -> dict[int, Fraction]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from bbtc.artefacts.numbers import figure_text
-from bbtc.cli.wording import at, block_line, counted, exact, oneof_note, within
+from bbtc.cli.wording import at, block_line, counted, exact, oneof_note, steps_of, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.plan.bounds import TaskValue
@@ -58,10 +58,10 @@ def bounds_lines(tree: Tree, max_actions: int | None = None) -> list[str]:
     return [f"the best that any policy can do{within(max_actions)} is {best_possible(*tree.bounds)}"]
 
 
-def dead_end_lines(ends: Sequence[DeadEnd], max_actions: int | None = None) -> list[str]:
+def dead_end_lines(tree: Tree, ends: Sequence[DeadEnd], max_actions: int | None = None) -> list[str]:
     """Why a target is out of reach: where runs end, the most probable first, with the line of the
-    action it is due to, and what that comes from. Within a number of actions, those that lose no part of
-    the goal by itself have run out of actions, and are told in sum."""
+    action it is due to, what that comes from, and the most probable run to it. Within a number of
+    actions, those that lose no part of the goal by itself have run out of actions, and are told in sum."""
     lines = []
     late = sum((end.probability for end in ends if not end.lost), Fraction(0))
     if max_actions is not None and late:
@@ -72,6 +72,10 @@ def dead_end_lines(ends: Sequence[DeadEnd], max_actions: int | None = None) -> l
         when = "from the start" if end.action is None else f"after {end.action}{at(end.span)}"
         lines.append(f"  {exact(end.probability)}: {when}, nothing can bring about {why}")
         lines.extend(f"    {block_line(block)}" for block in end.blocks[:_MOST_BLOCKS])
+        if end.run is not None and end.run.steps:
+            share = "" if end.run.probability == end.probability else f", {exact(end.run.probability)}"
+            lines.append(f"    most probably so{share}:")
+            lines.extend(f"      {line}" for line in steps_of(tree, end.run))
     rest = ends[_MOST_ENDS:]
     if rest:
         probability = exact(sum((end.probability for end in rest), Fraction(0)))

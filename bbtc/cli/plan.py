@@ -178,7 +178,12 @@ def run_planner(
     most = options.max_actions
     ends = dead_ends(plan.tree, replace(limits, seconds=None))
     made = simplified_line(told[-1], plan.tree) if told and not quiet else []
-    lines = [*made, *plan_summary(plan, most), *bounds_lines(plan.tree, most), *dead_end_lines(ends, most)]
+    lines = [
+        *made,
+        *plan_summary(plan, most),
+        *bounds_lines(plan.tree, most),
+        *dead_end_lines(plan.tree, ends, most),
+    ]
     for line in lines:
         session.say(line)
     return plan

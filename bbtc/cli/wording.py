@@ -34,6 +34,7 @@ __all__ = [
     "refinement_line",
     "run_lines",
     "simplified_line",
+    "steps_of",
     "within",
 ]
 
@@ -159,17 +160,17 @@ def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> lis
     for each in runs:
         status = each.run.status
         ending = ", blocked" if status is Status.RUNNING else ""
-        whys = [block_line(block) for block in each.blocks[:_MOST_BLOCKS]]
+        whys = [block_line(block, " of the tree") for block in each.blocks[:_MOST_BLOCKS]]
         if not whys and each.lost:
             lost = " and ".join(describe(tree.task, part) for part in each.lost)
-            whys = [f"nothing can bring about {lost}"]
+            whys = [f"no action of the tree can bring about {lost}"]
         if not whys:
             node, condition = each.stop.node or tree.root.id, each.stop.condition
             what = _stopped(tree, node, condition, status if each.stop.status is None else each.stop.status)
-            whys = [f"{what}, node {node}: the tree has nothing left to try"]
+            whys = [f"{what}, node {node}: the goal may be in reach, but the tree has nothing left to try"]
         lines.append(f"  {exact(each.run.probability)}{ending}: {whys[0]}")
         lines.extend(f"    and {why}" for why in whys[1:])
-        lines.extend(f"    {line}" for line in _steps(tree, each.run))
+        lines.extend(f"    {line}" for line in steps_of(tree, each.run))
     if rest and runs:
         lines.append(f"  {exact(rest)}: other runs")
     return lines
@@ -184,7 +185,7 @@ def run_lines(tree: Tree, run: Scenario) -> list[str]:
     ]
 
 
-def _steps(tree: Tree, run: Scenario) -> list[str]:
+def steps_of(tree: Tree, run: Scenario) -> list[str]:
     """The actions of a run; of very many, the last ones."""
     lines = run_lines(tree, run) or ["no action started"]
     left_out = len(lines) - _MOST_STEPS
@@ -193,25 +194,26 @@ def _steps(tree: Tree, run: Scenario) -> list[str]:
     return [f"{counted(left_out, 'action')} before, then", *lines[left_out:]]
 
 
-def block_line(block: Block) -> str:
-    """A fact that nothing brings back, in words."""
+def block_line(block: Block, whose: str = "") -> str:
+    """A fact that nothing brings back, in words. ``whose`` says which actions were asked, if not all."""
     needing = f"the goal{at(block.span)}" if block.action is None else f"{block.action}{at(block.span)}"
     if block.setters:
         listed = ", ".join(block.setters[:_MOST_BLOCKS])
         more = f" and {len(block.setters) - _MOST_BLOCKS} more" if len(block.setters) > _MOST_BLOCKS else ""
-        value = {
-            Truth.TRUE: block.fact,
-            Truth.FALSE: f"not {block.fact}",
-            Truth.UNKNOWN: f"unknown {block.fact}",
-        }
-        what = value[block.value]
-        return f"{needing} needs {what}, and nothing brings it back: {listed}{more} cannot without it"
+        lead = {Truth.TRUE: "", Truth.FALSE: "not ", Truth.UNKNOWN: "unknown "}[block.value]
+        return (
+            f"{needing} needs {lead}{block.fact}, and no action{whose} brings it back: "
+            f"{listed}{more} cannot without it"
+        )
     if block.value is Truth.UNKNOWN:
-        return f"{needing} needs {block.fact} to be unknown, and no action makes it that"
+        return f"{needing} needs {block.fact} to be unknown, and no action{whose} makes it that"
     negation = "" if block.value is Truth.TRUE else "not "
     if block.now is Truth.UNKNOWN:
-        return f"{needing} needs {negation}{block.fact}, which is unknown: no action observes or achieves it"
-    return f"{needing} needs {negation}{block.fact}, and no action makes that true"
+        return (
+            f"{needing} needs {negation}{block.fact}, which is unknown: "
+            f"no action{whose} observes or achieves it"
+        )
+    return f"{needing} needs {negation}{block.fact}, and no action{whose} makes that true"
 
 
 def at(span: Span | None) -> str:

@@ -2,9 +2,9 @@
 put it within reach.
 
 Who could bring a fact about are alternatives, what one of them needs stands together: an AND-OR graph with
-loops. A fact on the way can also be given outright, which costs more than any way down that ends in facts that
-nobody brings about. Where the way goes in a circle, as of a battery that is empty and of a charger that is out
-of reach without it, the fact that it comes back to is the root.
+loops. A fact on the way can also be given outright, which costs more than any way down that ends in facts
+that nobody brings about. Where the way goes in a circle, as of a battery that is empty and of a charger that
+is out of reach without it, the fact that it comes back to is the root.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ F = TypeVar("F", bound=Hashable)
 _MOST_FACTS = 2000
 """So many facts are followed at most; those beyond count as given."""
 _Cost: TypeAlias = tuple[int, float]
-"""Whether a fact has to be given that something could bring about, and what all else takes. Several parts that
-need one have mostly the same in mind: it counts once."""
+"""Whether a fact has to be given that something could bring about, and what all else takes. Several parts
+that need one have mostly the same in mind: it counts once."""
 _GIVEN: _Cost = (1, 2.5)
 _NEVER: _Cost = (2, 0.0)
 

@@ -18,7 +18,7 @@ from bbtc.tree.nodes import Tree
 @dataclass(frozen=True, slots=True)
 class FailingRun:
     """A run without success. ``blocks`` are the facts that nothing brings back from its end, for want of
-    which the goal is lost; without them the goal is still within reach of some actions, but the tree takes none.
+    which the goal is lost; without them it may be in reach of some actions, but the tree takes none.
     ``stop`` is where it stopped."""
 
     run: Scenario

@@ -4,16 +4,20 @@ nothing brings back from there."""
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from typing import TypeAlias
 
 from typing_extensions import assert_never
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
+from bbtc.belief.scenarios import Scenario, scenarios
 from bbtc.belief.state import Values
 from bbtc.belief.tick import Status
+from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts
 from bbtc.ground.describe import describe
 from bbtc.ground.repair import Every, Need, Repairs, Root, Some, Way, every, some
@@ -43,13 +47,22 @@ class Block:
 class DeadEnd:
     """Runs of this total probability end without the goal after ``action`` (None: they start so).
     ``lost`` are the parts of the goal that nothing can make true from there; empty where only their
-    combination is out of reach. ``blocks`` say what that comes from, as far as it can be told."""
+    combination is out of reach. ``blocks`` say what that comes from, as far as it can be told; ``run`` is
+    the most probable of them."""
 
     probability: Fraction
     action: str | None
     span: Span | None
     lost: tuple[str, ...]
     blocks: tuple[Block, ...] = ()
+    run: Scenario | None = None
+
+
+_MOST_EXPLAINED = 1000
+"""Ways to end without the goal of which it is told what they lack: the most probable."""
+_MOST_RUNS = 200
+"""Runs looked at for the most probable one of each way."""
+_Key: TypeAlias = "tuple[str | None, tuple[str, ...], tuple[Block, ...]]"
 
 
 def dead_ends(tree: Tree, limits: Limits) -> tuple[DeadEnd, ...]:
@@ -60,28 +73,42 @@ def dead_ends(tree: Tree, limits: Limits) -> tuple[DeadEnd, ...]:
     task = tree.task
     chain = explore(task, tree.root, limits)
     visits = Absorption(chain).visits()
-    roots = RootFinder(task, limits)
     ends = {state for state in chain.final if chain.status[state] is not Status.SUCCESS}
-    found: dict[tuple[str | None, tuple[str, ...], tuple[Block, ...]], Fraction] = {}
-
-    def add(action: str | None, state: int, probability: Fraction) -> None:
-        values = chain.states[state].values
-        lost = tuple(describe(task, part) for part in roots.lost(values))
-        key = (action, lost, roots.blocks(values))
-        found[key] = found.get(key, Fraction(0)) + probability
-
+    weights: dict[tuple[str | None, int], Fraction] = {}
     for probability, state in chain.initial:
         if state in ends and probability:
-            add(None, state, probability)
+            weights[None, state] = probability
     for state, edges in enumerate(chain.edges):
         for edge in edges:
             if edge.target in ends:
+                last = chain.actions[chain.action[state]].action, edge.target
                 weight = (visits[state] or Fraction(0)) * edge.result.probability
-                add(chain.actions[chain.action[state]].action, edge.target, weight)
+                weights[last] = weights.get(last, Fraction(0)) + weight
+    roots = RootFinder(task, limits)
+    keys: dict[tuple[str | None, int], _Key] = {}
+    found: dict[_Key, Fraction] = {}
+    for end in sorted(weights, key=lambda end: -weights[end]):  # stable: else as found
+        values = chain.states[end[1]].values
+        lost = tuple(describe(task, part) for part in roots.lost(values))
+        blocks = roots.blocks(values) if len(keys) < _MOST_EXPLAINED else ()
+        keys[end] = end[0], lost, blocks
+        found[keys[end]] = found.get(keys[end], Fraction(0)) + weights[end]
+    runs: dict[_Key, Scenario] = {}
+    with suppress(LimitReached):  # the ends are told without them
+        for run in islice(scenarios(chain, limits, failing=True), _MOST_RUNS):
+            action = run.steps[-1].node.action if run.steps else None
+            runs.setdefault(keys[action, run.end], run)
     ranked = sorted(found.items(), key=lambda item: (-item[1], item[0][0] or "", item[0][1]))
     return tuple(
-        DeadEnd(p, action, None if action is None else task.action_by_name[action].span, lost, blocks)
-        for (action, lost, blocks), p in ranked
+        DeadEnd(
+            probability,
+            action,
+            None if action is None else task.action_by_name[action].span,
+            lost,
+            blocks,
+            runs.get((action, lost, blocks)),
+        )
+        for (action, lost, blocks), probability in ranked
     )
 
 

@@ -132,6 +132,22 @@ def test_costs_come_from_the_effect_and_the_initial_numbers() -> None:
     assert _task("(and (p) (s b) (s c))", "(q) (r) (s a)").action_by_name["use()"].cost == 0
 
 
+@pytest.mark.parametrize(
+    ("amount", "cost"),
+    [
+        ("(+ 7 (- 3))", "4"),
+        ("(- 7 3)", "4"),
+        ("(- (- 3))", "3"),
+        ("(* 7 (- (- 1/2)))", "7/2"),
+        ("(/ 7 2)", "7/2"),
+        ("(+ (length a) (* 2 3))", "17/2"),
+        ("(- 7 (length a))", "9/2"),
+    ],
+)
+def test_arithmetic_is_that_of_school(amount: str, cost: str) -> None:
+    assert _only(_task(f"(and (p) (increase (total-cost) {amount}))")).cost == Fraction(cost)
+
+
 def test_a_branch_may_cost_more() -> None:
     action = _only(
         _task("(and (increase (total-cost) 1) (probabilistic 0.5 (and (p) (increase (total-cost) 3))))")

@@ -79,6 +79,21 @@ def test_a_recursive_derived_predicate_is_unfolded() -> None:
     assert describe(task, task.goal) == "(on(a,c) or (on(a,b) and on(b,c)))"
 
 
+def test_what_is_derived_for_certain_of_one_object_is_never_false_of_it() -> None:
+    """`k` holds of `a` by a fact that never changes, of `b` by one that does: only `b` can be not `k`."""
+    task = task_of(
+        """(define (domain d) (:types t) (:predicates (fixed ?x - t) (s ?x - t) (k ?x - t) (g ?x - t) (done))
+          (:constants a b - t)
+          (:derived (k ?x) (or (fixed ?x) (s ?x)))
+          (:action put :parameters (?x - t) :effect (s ?x))
+          (:action go :parameters (?x - t) :precondition (not (k ?x)) :effect (g ?x))
+          (:action end :precondition (or (g a) (g b) (s b)) :effect (done)))
+        (define (problem x) (:domain d) (:init (fixed a)) (:goal (done)))"""
+    )
+    assert "go(b)" in task.action_by_name
+    assert "go(a)" not in task.action_by_name
+
+
 @given(st.lists(st.sampled_from(list(Truth)), min_size=9, max_size=9))
 def test_a_derived_atom_has_the_value_of_the_least_fixpoint(values: list[Truth]) -> None:
     task = _task(" ".join(f"(unknown (on {x} {y}))" for x in "abc" for y in "abc"), "(above a c)")
@@ -110,6 +125,21 @@ def test_a_probabilistic_start_is_spelled_out() -> None:
         ("on(a,b)",): Fraction(1, 8),
         ("on(a,b)", "p(a)"): Fraction(1, 8),
     }
+
+
+def test_a_draw_of_probability_0_is_no_initial_state() -> None:
+    """Nor does it make anything possible: the goal is refused as if it were not written."""
+    init = "(probabilistic 1 (q) 0 (on a b)) (probabilistic 0 (p b) 1/4 (p a))"
+    task = instantiate(model_of(_text(init, "(p c)")), Report(), Limits())
+    states = [
+        (
+            state.probability,
+            [v.name for v, value in zip(task.variables, state.values, strict=True) if value is Truth.TRUE],
+        )
+        for state in task.initial
+    ]
+    assert sorted(states) == [(Fraction(1, 4), ["p(a)"]), (Fraction(3, 4), [])]
+    assert [code for code, _, _ in _errors("(q) (probabilistic 1 (p a) 0 (r))", "(r)")] == ["BBT0412"]
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,16 @@ def test_what_is_dropped_does_not_cost_the_target(data: st.DataObject, target: s
     assert violations(of, explore(of, smaller, Limits())) == []
 
 
+def test_a_tree_that_is_blocked_where_another_starts_its_first_action_does_something_else() -> None:
+    """Both are running in that state: only one of them does anything."""
+    of = task("goal", {0: Truth.UNKNOWN}, Is(0, T), action("look", TRUE, ("1/2", {0: T}), ("1/2", {0: F})))
+    looking = numbered(control("skipper", is_true(0), do("look()")))
+    chain = explore(of, looking, Limits())
+    assert same_runs(of, chain, looking)
+    assert not same_runs(of, chain, ConditionNode("n1", Is(0, T)))
+    assert not same_runs(of, explore(of, ConditionNode("n1", Is(0, T)), Limits()), looking)
+
+
 # --- by example ------------------------------------------------------------------------------
 
 

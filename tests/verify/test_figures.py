@@ -177,6 +177,28 @@ def test_trees_that_are_not_sound_are_refused() -> None:
     assert "BBT0802" in codes(dark)  # it starts without light
 
 
+def findings(tree: Tree) -> list[tuple[str, str]]:
+    return [(problem.code, problem.message) for problem in verify(tree, Limits(), "own").problems]
+
+
+def test_an_action_that_may_start_without_its_precondition_is_a_finding_of_its_own() -> None:
+    """It looks for the can without light, and succeeds only if it sees it: all else is as it claims."""
+    dark = ControlNode(
+        "n1", "sequence", (ActionNode("n2", "detect(soda)"), ConditionNode("n3", soda_tree().task.goal))
+    )
+    half = Fraction(1, 2)
+    tree = replace(soda_tree(), root=dark, success_probability=half, status="stuck", bounds=None)
+    assert findings(tree) == [("BBT0802", "an action can start where its precondition is not true")]
+
+
+def test_success_without_the_goal_is_told_with_its_probability() -> None:
+    tree = soda_tree()
+    lit = replace(tree, root=ActionNode("n1", "light_on()"), success_probability=Fraction(1), status="stuck")
+    assert findings(replace(lit, bounds=None)) == [
+        ("BBT0802", "with probability 1 the tree succeeds where the goal is not true")
+    ]
+
+
 def test_limits_end_the_recomputation() -> None:
     tree = soda_tree()
     with pytest.raises(LimitReached, match="states"):
