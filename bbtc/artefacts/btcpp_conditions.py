@@ -152,9 +152,9 @@ class ConditionReader(Generic[S]):
     ) -> Callable[[tuple[Condition, ...]], And | Or] | None:
         """What a control node is for conditions: the minimum, the maximum, or nothing. A Parallel remembers
         what its parts returned, unless its result is fetched in the same tick."""
-        if has(element, "ReactiveSequence"):
+        if has(element, "ReactiveSequence") and element.children:
             return And
-        if has(element, "ReactiveFallback"):
+        if has(element, "ReactiveFallback") and element.children:
             return Or
         if not has(element, "Parallel") or not registered or len(element.children) < 2:
             return None

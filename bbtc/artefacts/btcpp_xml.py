@@ -7,7 +7,7 @@ its place. What a tree cannot hold is reported with its place. The inverse of :m
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import islice
@@ -17,6 +17,7 @@ from bbtc.artefacts.btcpp_layout import Layout, is_port
 from bbtc.artefacts.btcpp_leaves import Leaves
 from bbtc.artefacts.btcpp_notes import Notes, read_notes, with_notes
 from bbtc.artefacts.btcpp_patterns import (
+    READ,
     REGISTER,
     RETRY,
     UNTIL_BLOCKED,
@@ -165,9 +166,23 @@ class _Reader:
 
     def raise_faults(self) -> None:
         """Raise :class:`BbtcError` if anything could not be read, or was not."""
-        left = self._unread.left(self._reached.values(), whole=not self._faults)
+        reachable = self._layout.reachable()
+        left = self._unread.left(reachable, whole=not self._faults)
         self._faults += islice(left, _MOST_FAULTS)
+        if self._faults:
+            self._faults += islice(self._strangers(reachable), _MOST_FAULTS)
         self._raise(self._faults)
+
+    def _strangers(self, trees: Iterable[XmlElement]) -> Iterator[Diagnostic]:
+        """What has no counterpart anywhere, also where nobody has looked because something else is wrong."""
+        for tree in trees:
+            stack = list(reversed(tree.children))
+            while stack:
+                element = stack.pop()
+                if tag_of(element) not in READ and not self._leaves.is_leaf(element):
+                    message, hint = self._no_counterpart(element)
+                    yield unreadable(self._document, element, "BBT0616", message, hint=hint).diagnostic
+                stack.extend(reversed(element.children))
 
     @staticmethod
     def _raise(faults: list[Diagnostic]) -> None:
