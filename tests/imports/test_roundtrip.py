@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 from fractions import Fraction
 
@@ -20,6 +21,8 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, 
 from bbtc.tree.validate import check_tree
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.export.test_btcpp import nested
+from tests.imports.labels import labelled
+from tests.long_form import amount
 from tests.replay.random_trees import random_tree
 from tests.strategies import HOSTILE_NAMES, trees
 
@@ -80,6 +83,30 @@ def test_random_trees_come_back() -> None:
         tree = replace(tree, bounds=(Fraction(1, 3), Fraction(1, 2)) if seed % 2 else None)
         for options in OPTIONS:
             assert read(exported(tree, **options), tree.task) == tree, seed
+
+
+ALL_OPTIONS = [
+    {"nodes": nodes, "namespace": namespace, "model": model}
+    for nodes in ("stock", "bbtc")
+    for namespace in ("", "my-robot")
+    for model in (True, False)
+]
+
+
+def test_labels_that_look_like_something_else_come_back() -> None:
+    found = seed = 0
+    while found < amount(120, 5000):
+        seed += 1
+        rng = random.Random(seed)
+        tree = labelled(random_tree(seed, latched=0.6, depth=rng.choice([2, 3, 4])), rng)
+        if not is_sound(tree):
+            continue
+        found += 1
+        options = ALL_OPTIONS[seed % len(ALL_OPTIONS)]
+        assert read(exported(tree, **options), tree.task) == tree, (seed, options)
+        # Without the comment, what is read is what would be written of it, label by label.
+        plain = read(exported(tree, notes=False, **options), tree.task, str(options["namespace"]))
+        assert read(exported(plain, **options), tree.task) == plain, (seed, options)
 
 
 def test_without_notes_all_but_ids_and_claims_comes_back() -> None:
