@@ -146,7 +146,7 @@ class _Reader:
         self._task = task
         self._limits = limits
         self._faults: list[Diagnostic] = []
-        self._read = 0
+        self._read = self._nodes = 0
         self.places: dict[int, XmlElement] = {}
         self._flag: str | None = None
         self._counters: set[str] = set()
@@ -299,7 +299,7 @@ class _Reader:
             if scope.level > MAX_DEPTH:
                 message = f"a tree has at most {MAX_DEPTH} levels"
                 raise unreadable(self._document, element, "BBT0605", message)
-            self._count()
+            self._count_node(element)
             node: Node = yield self._read_node(element, scope)
         except Unreadable as found:
             self._fault(found)
@@ -309,6 +309,14 @@ class _Reader:
             node = replace(node, reason=reason.removeprefix(_REASON) or None)
         self.places[id(node)] = element
         return node
+
+    def _count_node(self, element: XmlElement) -> None:
+        """A node will be read, in the place of its SubTree where it has one."""
+        self._count()
+        self._nodes += not has(element, "SubTree")
+        if self._nodes > self._limits.nodes:
+            message = f"the tree has more than the limit of {self._limits.nodes} nodes"
+            raise self._limits.reached(message, "--max-nodes")
 
     def _count(self, number: int = 1) -> None:
         """Elements or ports have been read, in a place of their own: SubTrees that call SubTrees may make
