@@ -241,7 +241,8 @@ class BtcppReplay(Replay):
                         self._register_leaf(known[key], symbol, values, objects)
                     element.tag = known[key]
         for model in document.findall("TreeNodesModel"):
-            document.remove(model)
+            for entry in [entry for entry in model if entry.tag in ("Action", "Condition")]:
+                model.remove(entry)
 
     def _register_leaf(
         self, node_id: str, symbol: Symbol, values: list[str], objects: Mapping[str, str]

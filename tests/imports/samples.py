@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 from fractions import Fraction
+from importlib.util import find_spec
 from xml.etree import ElementTree as ET
 
 from bbtc.artefacts.btcpp_xml import Imported, tree_from_btcpp
@@ -14,6 +16,8 @@ from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
+from tests.replay.reference import expected_ticks
+from tests.replay.ticks import TickWorld, random_script
 
 PROFILES = ("stock", "bbtc")
 
@@ -137,6 +141,23 @@ def refusal(text: str, task: Task) -> list[Diagnostic]:
         found = list(error.diagnostics)
     assert all(each.span is not None for each in found), found
     return found
+
+
+def check_in_engine(tree: Tree, text: str, rng: random.Random, scripts: int = 3) -> None:
+    """Fail unless the engine, where it is there, does with a file what the reference does with the tree that
+    is read of it. ``tree`` is the one the file was made from."""
+    if find_spec("behaviortreepy") is None:
+        return
+    from bbtc.replay.engines import BtcppReplay
+
+    imported, doubts = read(text, tree.task)
+    if any(doubt.code == "BBT0620" for doubt in doubts):
+        return  # it ticks for ever, which the warning says
+    replay = BtcppReplay(tree, text)
+    replay.begin(TickWorld(tree.task, random_script(tree.task, rng, 1)))
+    for _ in range(scripts):
+        script = random_script(tree.task, rng, 12)
+        assert replay.trace(script) == expected_ticks(tree.task, imported.tree.root, script), text
 
 
 def lines_of(found: list[Diagnostic]) -> list[tuple[int, str]]:

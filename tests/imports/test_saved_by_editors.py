@@ -20,7 +20,7 @@ from bbtc.source import SourceFile
 from bbtc.syntax.reader import decode_source
 from bbtc.tree.nodes import Tree
 from tests.domains.problems import PROBLEMS, Problem, plan_of
-from tests.imports.samples import PROFILES, elements, exported, idioms_tree, parsed, read
+from tests.imports.samples import PROFILES, check_in_engine, elements, exported, idioms_tree, parsed, read
 
 
 class Saved(Protocol):
@@ -279,7 +279,7 @@ def test_a_file_without_claims_is_told_none() -> None:
 
 def test_a_default_of_the_palette_counts_for_a_subtree() -> None:
     tree = idioms_tree()
-    text = exported(tree, "bbtc")
+    text = exported(tree, "stock")
     call = re.search(r'<SubTree ID="(FindCan_UnknownSeen)"( \w+)="cup"', text)
     assert call is not None
     port = call.group(2).strip()
@@ -290,6 +290,12 @@ def test_a_default_of_the_palette_counts_for_a_subtree() -> None:
     begin = bare.index(model)
     given = bare[:begin] + bare[begin:].replace(f'name="{port}"', f'name="{port}" default="cup"', 1)
     assert read(given, tree.task)[0].tree == tree
+    check_in_engine(tree, given, random.Random(1))
+    remapped = bare.replace(
+        f'<SubTree ID="{call.group(1)}"', f'<SubTree ID="{call.group(1)}" _autoremap="true"', 1
+    )
+    with pytest.raises(BbtcError, match="has no value here"):
+        read(remapped, tree.task)
 
 
 def test_utf_16_is_refused_with_what_to_do(tmp_path: Path) -> None:

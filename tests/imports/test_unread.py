@@ -6,7 +6,6 @@ from __future__ import annotations
 import random
 import re
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -19,6 +18,7 @@ from bbtc.tree.nodes import ControlNode, Node, Tree
 from tests.imports.engine_nodes import NODES, PORTS, SCRIPTS
 from tests.imports.samples import (
     PROFILES,
+    check_in_engine,
     elements,
     exported,
     idioms_tree,
@@ -30,8 +30,6 @@ from tests.imports.samples import (
     text_of,
 )
 from tests.long_form import amount
-from tests.replay.reference import expected_ticks
-from tests.replay.ticks import TickWorld, random_script
 
 TREE = idioms_tree()
 FILES = {nodes: exported(TREE, nodes) for nodes in PROFILES}
@@ -230,22 +228,8 @@ def test_a_node_is_read_or_refused_by_its_name_and_line(nodes: str, tag: str, po
             continue
         assert tag in READ, text
         done += 1
-        if nodes == "stock" and done % 4 == 0 and find_spec("behaviortreepy") is not None:
-            check_in_engine(text, rng)
-
-
-def check_in_engine(text: str, rng: random.Random) -> None:
-    """Fail unless the engine does with a file what the reference does with the tree that is read of it."""
-    from bbtc.replay.engines import BtcppReplay
-
-    imported, doubts = read(text, TREE.task)
-    if any(doubt.code == "BBT0620" for doubt in doubts):
-        return
-    replay = BtcppReplay(TREE, text)
-    replay.begin(TickWorld(TREE.task, random_script(TREE.task, rng, 1)))
-    for _ in range(3):
-        script = random_script(TREE.task, rng, 12)
-        assert replay.trace(script) == expected_ticks(TREE.task, imported.tree.root, script), text
+        if nodes == "stock" and done % 4 == 0:
+            check_in_engine(TREE, text, rng)
 
 
 def test_the_nodes_are_those_of_the_engine(shared: Path) -> None:
