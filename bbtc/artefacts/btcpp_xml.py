@@ -151,7 +151,6 @@ class _Reader:
         self._flag: str | None = None
         self._counters: set[str] = set()
         self._entries: dict[tuple[str, str], XmlElement] = {}
-        self._reached: dict[str, XmlElement] = {}
         self._unread = Unread(self._document)
         self._leaves = Leaves(task, self._document, notes.names, self._unread)
         self._conditions = ConditionReader(
@@ -159,7 +158,6 @@ class _Reader:
             self._document,
             self._leaves,
             self._unread,
-            trees=layout.trees,
             call=self._call,
             count=self._count,
         )
@@ -193,7 +191,8 @@ class _Reader:
 
     def doubts(self) -> Iterator[Diagnostic]:
         """What the file does that the tree does not tell, though it could be read."""
-        spare = [name for name in self._layout.trees if name not in self._reached]
+        called = {tree.attributes["ID"] for tree in self._layout.reachable()}
+        spare = [name for name in self._layout.trees if name not in called]
         if spare:
             listed = clip(", ".join(spare))
             place = self._document.span(self._layout.trees[spare[0]], "ID")
@@ -235,7 +234,6 @@ class _Reader:
         """The node in a BehaviorTree."""
         tree = self._layout.trees[name]
         self._unread.took(tree, "ID")
-        self._reached[name] = tree
         if len(tree.children) != 1:
             raise unreadable(
                 self._document, tree, "BBT0615", f"a BehaviorTree holds one node, not {len(tree.children)}"
