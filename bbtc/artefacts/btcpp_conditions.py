@@ -33,8 +33,7 @@ S = TypeVar("S", bound=PortScope)
 
 
 class ConditionReader(Generic[S]):
-    """Reads conditions; ``trees`` are the BehaviorTrees of the file, ``call`` follows a SubTree, and
-    ``count`` is called for each element read."""
+    """Reads conditions; ``call`` follows a SubTree, and ``count`` is called for each element read."""
 
     def __init__(
         self,
@@ -43,7 +42,6 @@ class ConditionReader(Generic[S]):
         leaves: Leaves,
         unread: Unread,
         *,
-        trees: Mapping[str, XmlElement],
         call: Callable[[XmlElement, S], tuple[XmlElement, S]],
         count: Callable[[], None],
     ) -> None:
@@ -52,9 +50,7 @@ class ConditionReader(Generic[S]):
         self._leaves = leaves
         self._unread = unread
         self._call = call
-        self._trees = trees
         self._count = count
-        self._not_conditions: set[str] | None = None
 
     def is_condition(self, element: XmlElement) -> bool:
         """Whether an element that is no sequence or fallback is written for a condition alone."""
@@ -65,46 +61,18 @@ class ConditionReader(Generic[S]):
         return self._leaves.is_leaf(element) and not self._leaves.is_action(element)
 
     def could_be(self, element: XmlElement) -> bool:
-        """Whether all that an element holds may be one condition."""
-        if self._not_conditions is None:
-            self._not_conditions = self._trees_of_nodes()
-        called = self._called(element)
-        return called is not None and not any(name in self._not_conditions for name in called)
-
-    def _trees_of_nodes(self) -> set[str]:
-        """The BehaviorTrees that hold more than a condition, in themselves or in those that they call."""
-        callers: dict[str, list[str]] = {}
-        found: list[str] = []
-        for name, tree in self._trees.items():
-            called = self._called(tree.children[0]) if len(tree.children) == 1 else None
-            if called is None or any(other not in self._trees for other in called):
-                found.append(name)
-            for other in called or ():
-                callers.setdefault(other, []).append(name)
-        known = set(found)
-        while found:
-            for caller in callers.get(found.pop(), ()):
-                if caller not in known:
-                    known.add(caller)
-                    found.append(caller)
-        return known
-
-    def _called(self, element: XmlElement) -> list[str] | None:
-        """The BehaviorTrees that an element calls; None if it holds what is not part of a condition."""
-        called: list[str] = []
+        """Whether all that an element holds may be one condition, as far as it shows without a look into
+        SubTrees."""
         stack = [element]
         while stack:
             part = stack.pop()
             self._count()
-            if match(REGISTER, part) is not None or self.is_condition(part):
+            if match(REGISTER, part) is not None or self.is_condition(part) or has(part, "SubTree"):
                 continue
-            if has(part, "SubTree"):
-                called.append(part.attributes.get("ID", ""))
-            elif (has(part, "ReactiveSequence") or has(part, "ReactiveFallback")) and part.children:
-                stack.extend(part.children)
-            else:
-                return None
-        return called
+            if not (has(part, "ReactiveSequence") or has(part, "ReactiveFallback")) or not part.children:
+                return False
+            stack.extend(part.children)
+        return True
 
     def read(
         self, element: XmlElement, scope: S, level: int = 1, *, registered: bool = False
@@ -152,9 +120,9 @@ class ConditionReader(Generic[S]):
     ) -> Callable[[tuple[Condition, ...]], And | Or] | None:
         """What a control node is for conditions: the minimum, the maximum, or nothing. A Parallel remembers
         what its parts returned, unless its result is fetched in the same tick."""
-        if has(element, "ReactiveSequence"):
+        if has(element, "ReactiveSequence") and element.children:
             return And
-        if has(element, "ReactiveFallback"):
+        if has(element, "ReactiveFallback") and element.children:
             return Or
         if not has(element, "Parallel") or not registered or len(element.children) < 2:
             return None

@@ -3,6 +3,7 @@ TreeNodesModel says of them."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 
 from bbtc.artefacts.btcpp_patterns import has
@@ -12,12 +13,13 @@ from bbtc.artefacts.xmltext import XmlDocument, XmlElement
 from bbtc.diagnostics import BbtcError, Diagnostic
 
 _MODEL = "TreeNodesModel"
+_PORT = re.compile(r"[A-Za-z][\w-]*")
 _PORTS = ("input_port", "output_port", "inout_port")
 
 
 def is_port(name: str) -> bool:
     """Whether the engine takes an attribute for a port."""
-    return name[:1].isascii() and name[:1].isalpha() and name not in ("name", "ID")
+    return _PORT.fullmatch(name) is not None and name not in ("name", "ID")
 
 
 class Layout:
@@ -32,7 +34,7 @@ class Layout:
         self.document = document
         root = document.root
         if root.tag != "root" or root.attributes.get("BTCPP_format") != "4":
-            self._refuse(
+            raise self._refusal(
                 "BBT0615", 'a BehaviorTree.CPP file of version 4 begins with <root BTCPP_format="4">'
             )
         self.trees = self._named()
@@ -45,13 +47,13 @@ class Layout:
             if tree.tag != "BehaviorTree":
                 continue
             if not tree.attributes.get("ID"):
-                self._refuse("BBT0615", "a BehaviorTree has an ID", tree)
+                raise self._refusal("BBT0615", "a BehaviorTree has an ID", tree)
             if tree.attributes["ID"] in trees:
                 message = f"two BehaviorTrees have the ID '{clip(tree.attributes['ID'])}'"
-                self._refuse("BBT0607", message, tree, "ID", hint="the engine takes the last one")
+                raise self._refusal("BBT0607", message, tree, "ID", hint="the engine takes the last one")
             trees[tree.attributes["ID"]] = tree
         if not trees:
-            self._refuse("BBT0615", "the file has no BehaviorTree")
+            raise self._refusal("BBT0615", "the file has no BehaviorTree")
         return trees
 
     def _models(self) -> dict[str, dict[str, str]]:
@@ -73,20 +75,36 @@ class Layout:
         if name not in self.trees:
             message = f"the file has no BehaviorTree '{clip(name)}'"
             if wanted is None:
-                self._refuse("BBT0615", message, attribute="main_tree_to_execute")
-            self._refuse("BBT0619", message, hint=f"it has {clip(', '.join(self.trees))}")
+                raise self._refusal("BBT0615", message, attribute="main_tree_to_execute")
+            raise self._refusal("BBT0619", message, hint=f"it has {clip(', '.join(self.trees))}")
         return name
+
+    def reachable(self) -> list[XmlElement]:
+        """The BehaviorTrees that the main tree calls, and itself, in the order of the file."""
+        found, waiting = {self.main}, [self.main]
+        while waiting:
+            for name in self._calls(self.trees[waiting.pop()]):
+                if name in self.trees and name not in found:
+                    found.add(name)
+                    waiting.append(name)
+        return [tree for name, tree in self.trees.items() if name in found]
+
+    @staticmethod
+    def _calls(tree: XmlElement) -> set[str]:
+        called: set[str] = set()
+        stack = list(tree.children)
+        while stack:
+            element = stack.pop()
+            if has(element, "SubTree"):
+                called.add(element.attributes.get("ID", ""))
+            stack.extend(element.children)
+        return called
 
     def _uncalled(self) -> str:
         """The BehaviorTree that no other calls."""
         called: set[str] = set()
         for name, tree in self.trees.items():
-            stack = list(tree.children)
-            while stack:
-                element = stack.pop()
-                if has(element, "SubTree") and element.attributes.get("ID") != name:
-                    called.add(element.attributes.get("ID", ""))
-                stack.extend(element.children)
+            called |= self._calls(tree) - {name}
         free = [name for name in self.trees if name not in called]
         if len(free) == 1:
             return free[0]
@@ -97,8 +115,7 @@ class Layout:
             )
         else:
             message = f"the file does not tell its main tree, and nobody calls these: {clip(', '.join(free))}"
-        self._refuse("BBT0619", message, hint=hint)
-        raise AssertionError("refused")
+        raise self._refusal("BBT0619", message, hint=hint)
 
     def faults(self, unread: Unread) -> Iterator[Diagnostic]:
         """What stands beside the BehaviorTrees and has a meaning that a tree has no place for. A
@@ -127,7 +144,7 @@ class Layout:
             message = "a processing instruction has no counterpart in a tree"
             yield Diagnostic("BBT0616", message, document.instruction_span(start))
 
-    def _refuse(
+    def _refusal(
         self,
         code: str,
         message: str,
@@ -135,6 +152,6 @@ class Layout:
         attribute: str | None = None,
         *,
         hint: str | None = None,
-    ) -> None:
+    ) -> BbtcError:
         span = self.document.span(element or self.document.root, attribute)
-        raise BbtcError.single(code, message, span, hint)
+        return BbtcError.single(code, message, span, hint)

@@ -8,7 +8,7 @@ the shape lacks is nobody's, which :mod:`bbtc.artefacts.btcpp_unread` reports.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -294,6 +294,24 @@ REGISTER = Shape(
 """A Parallel whose result an entry of the blackboard holds."""
 
 
+def _tags(shape: Shape) -> Iterator[str]:
+    yield shape.tag
+    for child in shape.children:
+        if isinstance(child, Shape):
+            yield from _tags(child)
+
+
+READ = frozenset(
+    ("ReactiveSequence", "ReactiveFallback", "Parallel", "SubTree", "Inverter", "ScriptCondition", LATCH)
+).union(
+    *(
+        _tags(shape)
+        for shape in (UNTIL_BLOCKED, RETRY, KNOWN, UNKNOWN, REGISTER, *(shape for shape, _ in _ACTIONS))
+    )
+)
+"""The nodes that mean something in some place, besides the leaves of a task."""
+
+
 # --- actions ---------------------------------------------------------------------------------
 
 
@@ -365,7 +383,10 @@ def _parts(
     guards, counters = tuple(needed), tuple[str, ...]()
     if len(needed) >= 2 and has(needed[-2], "ScriptCondition", 0) and has(needed[-1], "Script", 0):
         left, used = (part.attributes.get("code", "") for part in needed[-2:])
-        if _LEFT.fullmatch(left) and _USED.fullmatch(used) and _WORD.findall(left) == _WORD.findall(used):
-            guards, counters = tuple(needed[:-2]), tuple(_WORD.findall(left))
-            found.read.extend((part, ("code",)) for part in needed[-2:])
+        guards, counters = tuple(needed[:-2]), tuple(_WORD.findall(left))
+        found.read.extend((part, ("code",)) for part in needed[-2:])
+        if _LEFT.fullmatch(left) is None:
+            found.wrong.append((needed[-2], "code", "@x > 0"))
+        elif _USED.fullmatch(used) is None or tuple(_WORD.findall(used)) != counters:
+            found.wrong.append((needed[-1], "code", "; ".join(f"{counter} -= 1" for counter in counters)))
     return ActionParts(leaf, guards, counters, latched, flag, entry, found)

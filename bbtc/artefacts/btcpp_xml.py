@@ -7,7 +7,7 @@ its place. What a tree cannot hold is reported with its place. The inverse of :m
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import islice
@@ -17,6 +17,7 @@ from bbtc.artefacts.btcpp_layout import Layout, is_port
 from bbtc.artefacts.btcpp_leaves import Leaves
 from bbtc.artefacts.btcpp_notes import Notes, read_notes, with_notes
 from bbtc.artefacts.btcpp_patterns import (
+    READ,
     REGISTER,
     RETRY,
     UNTIL_BLOCKED,
@@ -145,12 +146,11 @@ class _Reader:
         self._task = task
         self._limits = limits
         self._faults: list[Diagnostic] = []
-        self._read = 0
+        self._read = self._nodes = 0
         self.places: dict[int, XmlElement] = {}
         self._flag: str | None = None
         self._counters: set[str] = set()
         self._entries: dict[tuple[str, str], XmlElement] = {}
-        self._reached: dict[str, XmlElement] = {}
         self._unread = Unread(self._document)
         self._leaves = Leaves(task, self._document, notes.names, self._unread)
         self._conditions = ConditionReader(
@@ -158,16 +158,29 @@ class _Reader:
             self._document,
             self._leaves,
             self._unread,
-            trees=layout.trees,
             call=self._call,
             count=self._count,
         )
 
     def raise_faults(self) -> None:
         """Raise :class:`BbtcError` if anything could not be read, or was not."""
-        left = self._unread.left(self._reached.values(), whole=not self._faults)
+        reachable = self._layout.reachable()
+        left = self._unread.left(reachable, whole=not self._faults)
         self._faults += islice(left, _MOST_FAULTS)
+        if self._faults:
+            self._faults += islice(self._strangers(reachable), _MOST_FAULTS)
         self._raise(self._faults)
+
+    def _strangers(self, trees: Iterable[XmlElement]) -> Iterator[Diagnostic]:
+        """What has no counterpart anywhere, also where nobody has looked because something else is wrong."""
+        for tree in trees:
+            stack = list(reversed(tree.children))
+            while stack:
+                element = stack.pop()
+                if tag_of(element) not in READ and not self._leaves.is_leaf(element):
+                    message, hint = self._no_counterpart(element)
+                    yield unreadable(self._document, element, "BBT0616", message, hint=hint).diagnostic
+                stack.extend(reversed(element.children))
 
     @staticmethod
     def _raise(faults: list[Diagnostic]) -> None:
@@ -178,7 +191,8 @@ class _Reader:
 
     def doubts(self) -> Iterator[Diagnostic]:
         """What the file does that the tree does not tell, though it could be read."""
-        spare = [name for name in self._layout.trees if name not in self._reached]
+        called = {tree.attributes["ID"] for tree in self._layout.reachable()}
+        spare = [name for name in self._layout.trees if name not in called]
         if spare:
             listed = clip(", ".join(spare))
             place = self._document.span(self._layout.trees[spare[0]], "ID")
@@ -220,7 +234,6 @@ class _Reader:
         """The node in a BehaviorTree."""
         tree = self._layout.trees[name]
         self._unread.took(tree, "ID")
-        self._reached[name] = tree
         if len(tree.children) != 1:
             raise unreadable(
                 self._document, tree, "BBT0615", f"a BehaviorTree holds one node, not {len(tree.children)}"
@@ -284,7 +297,7 @@ class _Reader:
             if scope.level > MAX_DEPTH:
                 message = f"a tree has at most {MAX_DEPTH} levels"
                 raise unreadable(self._document, element, "BBT0605", message)
-            self._count()
+            self._count_node(element)
             node: Node = yield self._read_node(element, scope)
         except Unreadable as found:
             self._fault(found)
@@ -294,6 +307,14 @@ class _Reader:
             node = replace(node, reason=reason.removeprefix(_REASON) or None)
         self.places[id(node)] = element
         return node
+
+    def _count_node(self, element: XmlElement) -> None:
+        """A node will be read, in the place of its SubTree where it has one."""
+        self._count()
+        self._nodes += not has(element, "SubTree")
+        if self._nodes > self._limits.nodes:
+            message = f"the tree has more than the limit of {self._limits.nodes} nodes"
+            raise self._limits.reached(message, "--max-nodes")
 
     def _count(self, number: int = 1) -> None:
         """Elements or ports have been read, in a place of their own: SubTrees that call SubTrees may make

@@ -16,7 +16,7 @@ from typing_extensions import assert_never
 from bbtc.export.btcpp_conditions import ConditionWriter
 from bbtc.export.btcpp_idioms import SKIPPER_LABEL, Idioms, Profile
 from bbtc.export.btcpp_names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
-from bbtc.export.btcpp_notes import CLAIM, TEMPLATE, notes, template_label
+from bbtc.export.btcpp_notes import CLAIM, TEMPLATE, condition_below, notes, template_label
 from bbtc.export.btcpp_options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.export.btcpp_palette import node_model
 from bbtc.export.interface import action_symbol, guard_of, variable_symbol
@@ -168,6 +168,9 @@ class _Writer:
         for each in node.children:
             children.append((yield self._written(each, place.down())))  # noqa: PERF401
         element = self.idioms.control(node.kind, children)
+        below = condition_below(self.task, node) if node.name else None
+        if below is not None and self.conditions.label(below, place.binding) == shown(node.name or ""):
+            return element  # with that name it would be one condition
         if node.name:
             element.set("name", shown(node.name))
         elif element.tag == "Parallel":

@@ -24,7 +24,7 @@ from typing_extensions import assert_never
 from bbtc.export.btcpp_idioms import SKIPPER_LABEL, is_retry_label
 from bbtc.export.btcpp_names import BtcppNames, shown, without_number
 from bbtc.export.shape import words_of, written
-from bbtc.ground.condition import TRUE
+from bbtc.ground.condition import TRUE, And, Condition, Or
 from bbtc.ground.describe import condition_as_lists
 from bbtc.ground.task import Task
 from bbtc.rounding import figure_text
@@ -92,6 +92,24 @@ def _digits(text: str) -> str:
     return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:3]
 
 
+def condition_below(task: Task, node: Node) -> Condition | None:
+    """The condition that a sequence or fallback reads as where nothing else is below it; its own name must
+    not be that of the condition then."""
+    match node:
+        case ConditionNode():
+            return written(task, node.condition)
+        case ControlNode(kind="sequence" | "fallback", children=children):
+            parts = [condition_below(task, child) for child in children]
+            found = tuple(part for part in parts if part is not None)
+            if len(found) < len(parts):
+                return None
+            return And(found) if node.kind == "sequence" else Or(found)
+        case ControlNode() | ActionNode():
+            return None
+        case _:
+            assert_never(node)
+
+
 def template_label(template: str) -> str:
     """The name of a SubTree that stands for a template; never empty, which the engine would take for the
     name of the main tree."""
@@ -105,6 +123,8 @@ def _exact(task: Task, node: Node) -> dict[str, object]:
     match node:
         case ControlNode():
             default = SKIPPER_LABEL if node.kind == "skipper" else None
+            if node.name and condition_below(task, node) is not None:
+                default = node.name  # which may not be written
         case ConditionNode():
             condition = written(task, node.condition)
             default = words_of(task, condition).short

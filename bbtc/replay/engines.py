@@ -162,16 +162,17 @@ class PyTreesReplay(Replay):
 
 
 class BtcppReplay(Replay):
-    """The exported XML of a tree, loaded into BehaviorTree.CPP once."""
+    """The exported XML of a tree, loaded into BehaviorTree.CPP once; ``source`` is that XML where it was
+    changed, with the same leaves."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, source: str | None = None) -> None:
         super().__init__()
         import behaviortreepy as engine
 
         self._engine = engine
         self._task = tree.task
         self._names = btcpp_names(tree)
-        self.source = btcpp.export(tree, {"model": True}, None)
+        self.source = btcpp.export(tree, {}, None) if source is None else source
         self._factory = engine.BehaviorTreeFactory()
         self._error: Exception | None = None
         self._root: Any = None
@@ -226,18 +227,12 @@ class BtcppReplay(Replay):
         its callback knows literal ports, and reads others from the SubTree's blackboard."""
         symbols = {node_id: symbol for symbol, node_id in names.ids.items()}
         objects = {value: name for name, value in names.values.items()}
-        model = document.find("TreeNodesModel")
-        assert model is not None
-        declared = {
-            entry.attrib["ID"]: [port.attrib["name"] for port in entry.iter("input_port")]
-            for entry in model
-            if entry.tag in ("Action", "Condition")
-        }
         known: dict[tuple[str, ...], str] = {}
         for tree in document.iter("BehaviorTree"):
             for element in tree.iter():
                 if element.tag in symbols:
-                    symbol, ports = symbols[element.tag], declared[element.tag]
+                    symbol = symbols[element.tag]
+                    ports = names.interface.leaves[symbol].parameters
                     values = [element.attrib.pop(port) for port in ports]
                     assert all(key == "name" or key.startswith("_") for key in element.attrib)
                     key = (element.tag, *values)
@@ -245,8 +240,9 @@ class BtcppReplay(Replay):
                         known[key] = f"Leaf{len(known)}"
                         self._register_leaf(known[key], symbol, values, objects)
                     element.tag = known[key]
-        for entry in [entry for entry in model if entry.tag in ("Action", "Condition")]:
-            model.remove(entry)
+        for model in document.findall("TreeNodesModel"):
+            for entry in [entry for entry in model if entry.tag in ("Action", "Condition")]:
+                model.remove(entry)
 
     def _register_leaf(
         self, node_id: str, symbol: Symbol, values: list[str], objects: Mapping[str, str]

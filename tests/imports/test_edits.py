@@ -259,6 +259,70 @@ def test_trees_that_double_and_double_again_meet_a_limit(both: str, leaf: str) -
         read(text, limits=Limits(nodes=500))
 
 
+def named(*trees: str) -> str:
+    """A file of trees M, t1, t2, …"""
+    ids = ["M", *(f"t{number}" for number in range(1, len(trees)))]
+    inside = "".join(
+        f'<BehaviorTree ID="{name}">{tree}</BehaviorTree>' for name, tree in zip(ids, trees, strict=True)
+    )
+    return f'<root BTCPP_format="4" main_tree_to_execute="M">{inside}</root>'
+
+
+def around(tag: str, inside: str, times: int = 1) -> str:
+    """Elements in others."""
+    return f"<{tag}>" * times + inside + f"</{tag.split(maxsplit=1)[0]}>" * times
+
+
+MANY = 20_000
+PORTS = " ".join(f'a{number}="x"' for number in range(MANY))
+SCRIPTED = " ".join(f'_a{number}="x"' for number in range(MANY))
+LATER = [f'<SubTree ID="t{number}" _autoremap="true"/>' for number in range(2, 202)]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        (named(f"<LuminousityOk {PORTS}/>"), "BBT0603"),
+        (named(f"<LuminousityOk {SCRIPTED}/>"), "BBT0616"),
+        (named("<LuminousityOk/>").replace("<root", f"<root {PORTS}"), "BBT0616"),
+        (named(f'<SubTree ID="t1" {PORTS}/>', *LATER, "<LuminousityOk/>"), "BBT0007"),
+        (named(around("ReactiveSequence", "<LuminousityOk/>" * MANY)), "BBT0007"),
+        (named(around("ReactiveSequence", '<LuminousityOk _skipIf="x"/>' * 900)), "BBT0616"),
+        (named("<LuminousityOk/>" + "x<!-- -->" * MANY), "BBT0616"),
+        (named(around("ReactiveSequence name='x'", "<LuminousityOk/>" * 900, 100)), "BBT0007"),
+        (named("<LuminousityOk/>").replace("M", "M" * MANY, 1), "BBT0615"),
+        (named("<LuminousityOk/>").replace('ID="M"', "").replace('main_tree_to_execute="M"', ""), "BBT0615"),
+        (named("<LuminousityOk/>", "<LuminousityOk/>").replace("t1", "M"), "BBT0607"),
+        (named("<LuminousityOk/>", '<SubTree ID="M"/>').replace('"M"', '"t1"', 1), ""),
+        (named('<SubTree ID="t1"/>', '<SubTree ID="M"/>'), "BBT0612"),
+    ],
+)  # fmt: skip
+def test_files_made_to_be_slow_end_soon(text: str, code: str) -> None:
+    """They take work that grows with the file, or meet a limit; and 50 messages at most."""
+    report = Report()
+    try:
+        tree_from_btcpp(SourceFile("tree.xml", text), soda_tree().task, report, Limits(nodes=2_000))
+    except BbtcError as error:
+        found = list(error.diagnostics)
+    else:
+        found = []
+    assert {each.code for each in found} == ({code} if code else set())
+    assert len(found) <= 50
+
+
+def test_a_condition_nested_through_trees_is_refused() -> None:
+    """BehaviorTrees that call one another make levels that XML does not have."""
+
+    def nested(tag: str) -> str:
+        calls = [around(tag, f'<SubTree ID="t{number}"/>', 100) for number in range(1, 101)]
+        return named(*calls, "<LuminousityOk/>")
+
+    assert isinstance(read(nested("Inverter"), None).root, ConditionNode)
+    deep = nested("ReactiveSequence").replace('ID="M">', 'ID="M"><Inverter>', 1)
+    deep = deep.replace("</BehaviorTree>", "</Inverter></BehaviorTree>", 1)
+    assert [code for code, _, _ in faults(deep)] == ["BBT0605"]
+
+
 def test_a_chain_of_very_many_trees_is_refused() -> None:
     chain = "".join(f'<BehaviorTree ID="t{i}"><SubTree ID="t{i + 1}"/></BehaviorTree>' for i in range(3000))
     text = (

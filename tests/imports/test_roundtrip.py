@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -12,16 +14,19 @@ from bbtc.artefacts import dumps, load_tree, tree_to_json
 from bbtc.artefacts.btcpp_xml import tree_from_btcpp
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.export.btcpp import btcpp
-from bbtc.export.shape import written
-from bbtc.ground.condition import TRUE
+from bbtc.export.shape import words_of, written
+from bbtc.ground.condition import TRUE, And, Is, Or
 from bbtc.ground.task import Task
+from bbtc.kleene import Truth
 from bbtc.source import SourceFile
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree, walk
 from bbtc.tree.validate import check_tree
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.export.test_btcpp import nested
+from tests.imports.labels import labelled
+from tests.long_form import amount
 from tests.replay.random_trees import random_tree
-from tests.strategies import HOSTILE_NAMES, trees
+from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 OPTIONS = [{"nodes": "stock"}, {"nodes": "bbtc"}, {"nodes": "bbtc", "namespace": "my-robot"}]
 
@@ -35,6 +40,16 @@ def read(text: str, task: Task, namespace: str = "") -> Tree:
     tree = tree_from_btcpp(SourceFile("tree.xml", text), task, report, namespace=namespace).tree
     assert not list(report)
     return tree
+
+
+def without_labels(tree: Tree) -> list[Node]:
+    """The nodes in order, without names and reasons."""
+    root = without_ids(tree)
+    return [replace(node, name=None, template=None, reason=None, **_childless(node)) for node in walk(root)]
+
+
+def _childless(node: Node) -> dict[str, Any]:
+    return {"children": (None,) * len(node.children)} if isinstance(node, ControlNode) else {}
 
 
 def is_sound(tree: Tree) -> bool:
@@ -80,6 +95,42 @@ def test_random_trees_come_back() -> None:
         tree = replace(tree, bounds=(Fraction(1, 3), Fraction(1, 2)) if seed % 2 else None)
         for options in OPTIONS:
             assert read(exported(tree, **options), tree.task) == tree, seed
+
+
+ALL_OPTIONS = [
+    {"nodes": nodes, "namespace": namespace, "model": model}
+    for nodes in ("stock", "bbtc")
+    for namespace in ("", "my-robot")
+    for model in (True, False)
+]
+
+
+def test_labels_that_look_like_something_else_come_back() -> None:
+    found = seed = 0
+    while found < amount(120, 5000):
+        seed += 1
+        rng = random.Random(seed)
+        tree = labelled(random_tree(seed, latched=0.6, depth=rng.choice([2, 3, 4])), rng)
+        if not is_sound(tree):
+            continue
+        found += 1
+        options = ALL_OPTIONS[seed % len(ALL_OPTIONS)]
+        assert read(exported(tree, **options), tree.task) == tree, (seed, options)
+        # Without the comment, what is read is what would be written of it, label by label.
+        plain = read(exported(tree, notes=False, **options), tree.task, str(options["namespace"]))
+        assert read(exported(plain, **options), tree.task) == plain, (seed, options)
+        assert without_labels(plain) == without_labels(tree), (seed, options)
+
+
+@pytest.mark.parametrize("kind", ["sequence", "fallback"])
+def test_a_label_that_reads_like_the_condition_of_the_nodes_below_comes_back(kind: ControlKind) -> None:
+    tree = soda_tree()
+    lit, seen = ConditionNode("n2", Is(0, Truth.TRUE)), ConditionNode("n3", Is(1, Truth.TRUE))
+    words = words_of(tree.task, (And if kind == "sequence" else Or)((lit.condition, seen.condition))).short
+    root = ControlNode("n1", kind, (lit, seen), words)
+    for options in OPTIONS:
+        text = exported(replace(tree, root=root), **options)
+        assert read(text, tree.task).root == root
 
 
 def test_without_notes_all_but_ids_and_claims_comes_back() -> None:

@@ -1,0 +1,102 @@
+"""Edits that look like a tree of ours and are none: in the engine they do something else."""
+
+from __future__ import annotations
+
+import random
+import re
+
+import pytest
+
+from bbtc.diagnostics import BbtcError
+from tests.imports.samples import check_in_engine, exported, idioms_tree, read, refusal
+
+TREE = idioms_tree()
+STOCK, OURS = exported(TREE, "stock"), exported(TREE, "bbtc")
+UNKNOWN_FIRST = '<ReactiveSequence><Seen item="can"/><Seen item="cup"/></ReactiveSequence>'
+MINIMUM = '<Parallel success_count="2" failure_count="1"><Seen item="can"/><Lit/></Parallel>'
+
+
+def ports(text: str) -> str:
+    """A text with the ports as the sample has them, which has no parameters' names."""
+    return text.replace("item=", "arg=")
+
+
+def block(text: str, tag: str, inside: str) -> str:
+    """The innermost element with some text in it."""
+    end = text.index(inside)
+    start = text.rindex(f"<{tag}", 0, end)
+    depth, at = 0, start
+    for found in re.finditer(rf"<(/?){tag}\b[^>]*?(/?)>", text[start:]):
+        depth += {"": 1, "/": -1}[found.group(1)] - (found.group(2) == "/")
+        at = start + found.end()
+        if depth == 0:
+            break
+    return text[start:at]
+
+
+def before_end(text: str, added: str) -> str:
+    """A file with something more to do in its first ReactiveFallback."""
+    at = text.index("<ReactiveFallback>") + len("<ReactiveFallback>")
+    return text[:at] + added + text[at:]
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (before_end(STOCK, ports(f"<Inverter>{UNKNOWN_FIRST}</Inverter>")), "unknown part"),
+        (before_end(STOCK, ports(f"<Inverter>{MINIMUM}</Inverter>")), "'Parallel'"),
+        (before_end(STOCK, ports(f"<ReactiveSequence>{MINIMUM}</ReactiveSequence>")), "'Parallel'"),
+        (before_end(STOCK, '<Inverter><ReactiveSequence/></Inverter>'), "'ReactiveSequence'"),
+        (before_end(STOCK, '<Inverter name="x"><Lit/><Lit/></Inverter>'), "'Inverter'"),
+        (before_end(STOCK, '<SubTree ID="FindCan_UnknownSeen" arg="7"/>'), "the number '7'"),
+        (before_end(OURS, '<Latch flag="other"><SwitchOn/></Latch>'), "sets 'other'"),
+        (before_end(OURS, '<Latch flag="{acting}"><SwitchOn/></Latch>'), "'flag'"),
+        (before_end(OURS, '<Latch keep="{x}"><SwitchOn/></Latch>'), "'keep'"),
+        (before_end(OURS, '<Latch keep="no"><SwitchOn/></Latch>'), "'keep'"),
+        (STOCK.replace("@acting := true", "@other := true", 1), "sets 'other'"),
+        (STOCK.replace("!@acting", "!@other", 1), "'if'"),
+        (STOCK.replace('if="!@acting" else="RUNNING"', 'if="!@acting"', 1), "lacks the attribute 'else'"),
+        (STOCK.replace('else="RUNNING"', 'else="SUCCESS"', 1), "'else'"),
+        (STOCK.replace("; _started := 'yes'", "", 1), "'code'"),
+        (STOCK.replace('then_skip="false"', 'then_skip="true"', 1), "'then_skip'"),
+        (STOCK.replace("attempts_left_1 -= 1", "attempts_left_1 -= 2", 1), "'code'"),
+        (STOCK.replace("attempts_left_1 &gt; 0", "attempts_left_1 &gt; 1", 1), "'code'"),
+        (STOCK.replace("@find_can_attempts_left_1", "left"), "'code'"),
+        (before_end(STOCK, block(STOCK, "ReactiveSequence", "<RunOnce")), "two retry nodes"),
+        (before_end(OURS, block(OURS, "ReactiveSequence", "<RunOnce")), "two retry nodes"),
+    ],
+)  # fmt: skip
+def test_what_the_engine_would_do_otherwise_is_refused(text: str, named: str) -> None:
+    found = refusal(text, TREE.task)
+    assert any(named in each.message for each in found), found
+
+
+def test_two_actions_of_a_tree_do_not_share_an_entry() -> None:
+    latch = block(STOCK, "Switch2", "<SwitchOn")
+    both = STOCK.replace(latch, f"<ReactiveSequence>{latch}{latch}</ReactiveSequence>", 1)
+    with pytest.raises(BbtcError, match="keeps its state in '_latch'"):
+        read(both, TREE.task)
+    # In a BehaviorTree of its own, called twice, each has an entry of its own.
+    call = next(iter(re.findall(r"<SubTree ID=\"\w+SwitchOnOnce\"[^>]*>", STOCK)))
+    twice = STOCK.replace(
+        call,
+        f"<ReactiveSequence>{call}{call.replace('()', '(2)')}</ReactiveSequence>",
+    )
+    assert read(twice, TREE.task)[0].tree.root != TREE.root
+    check_in_engine(TREE, twice, random.Random(2), 20)
+
+
+@pytest.mark.parametrize("nodes", ["stock", "bbtc"])
+def test_a_file_without_its_last_branch_is_read_with_a_warning(nodes: str) -> None:
+    text = exported(TREE, nodes)
+    begin = text.index("<", text.index(":= false"))
+    begin = text.index(">", text.rindex("<", 0, begin)) + 1
+    inside = text[
+        begin : text.index(
+            "</ReactiveSequence>", text.rindex("</ReactiveFallback>", 0, text.index("<Precondition"))
+        )
+    ]
+    outer = text[text.index("<", text.index("Made by bbtc")) : text.index("</BehaviorTree>")]
+    imported, doubts = read(text.replace(outer, inside), TREE.task)
+    assert imported.tree == TREE
+    assert [(doubt.code, doubt.severity.value) for doubt in doubts] == [("BBT0620", "warning")]
