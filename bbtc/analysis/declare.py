@@ -20,6 +20,10 @@ def sections(definition: ast.Definition, kind: type[S]) -> Iterator[S]:
     return (section for section in definition.sections if isinstance(section, kind))
 
 
+GOAL_FLUENTS = frozenset({"goal-probability", "goal-achieved"})
+"""What a metric may maximise besides a reward: every plan is made for it anyway."""
+
+
 def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None) -> None:
     """Fill ``names`` with the declarations of both definitions."""
     names.hierarchy = _types(names, domain)
@@ -191,12 +195,17 @@ def _functions(names: Names, domain: ast.Definition) -> None:
 
 def _fluents(names: Names, problem: ast.Definition | None) -> None:
     """The fluents that count cost and reward: ``total-cost`` and ``reward``, and the one a metric
-    minimises or maximises, which then counts in their place."""
+    minimises or maximises, which then counts in their place. Where it minimises ``total-time``, which is the
+    number of actions if no domain declares it (PDDL 2.1, 3.1), nothing counts in the place of 1 an action."""
     costs, rewards, counted = set(names.costs), set(names.rewards), set(names.counted)
     for metric in sections(problem, ast.Metric) if problem is not None else ():
         if isinstance(metric.expression, ast.FluentRef) and not metric.expression.args:
             key = metric.expression.name.key
-            if metric.direction == "minimize" and key not in rewards and key != "total-time":
+            if metric.direction == "minimize" and key == "total-time" and key not in names.functions:
+                counted = counted - costs
+            elif key in GOAL_FLUENTS and key not in names.functions:
+                continue
+            elif metric.direction == "minimize" and key not in rewards:
                 counted = (counted - costs) | {key}
                 costs.add(key)
             elif metric.direction == "maximize" and key not in costs:
