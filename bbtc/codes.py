@@ -53,6 +53,7 @@ CODES: dict[str, str] = {
     "BBT0224": "foreach without a node around it",
     "BBT0225": "name that is not declared",
     "BBT0226": "section given twice",
+    "BBT0230": "name that only a lenient reading takes",
     # 03xx: checks
     "BBT0301": "unused predicate",
     "BBT0302": "unreachable action",

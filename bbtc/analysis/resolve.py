@@ -28,15 +28,18 @@ _SEVERAL = (ast.Action, ast.Derived, ast.Sensor, ast.Template, ast.Hidden)
 _DOMAIN_ONLY = (ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template)
 
 
-def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Report) -> md.Model | None:
-    """The model of a domain, with a problem or alone (to check it).
+def resolve(
+    domain: ast.Definition, problem: ast.Definition | None, report: Report, *, lenient: bool = False
+) -> md.Model | None:
+    """The model of a domain, with a problem or alone (to check it); ``lenient`` as in
+    :class:`bbtc.source.Reading`.
 
     Errors go to ``report``, all of them; the result is None if it holds any. Probabilities whose
     sum differs from 1 by at most 1e-9 are taken as rounded and divided by their sum; a smaller sum
     gets an explicit no-change branch.
     """
     definitions = (domain,) if problem is None else (domain, problem)
-    names = Names(report, definitions=definitions)
+    names = Names(report, definitions=definitions, lenient=lenient)
     _check_sections(report, domain, problem)
     declare(names, domain, problem)
     schemas: dict[str, md.Schema] = {}

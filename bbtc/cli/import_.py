@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from bbtc.cli.export import require_place
-from bbtc.cli.session import Session, limit_options, output_options
+from bbtc.cli.session import Session, limit_options, output_options, problem_options
 from bbtc.cli.session import command as session_command
 
 
@@ -16,6 +16,7 @@ from bbtc.cli.session import command as session_command
     "--to", "form", default="json", show_default=True, metavar="FORMAT", help="What to write; see export."
 )
 @click.option("--namespace", default="", help="That of the ids in FILE, if its notes do not tell.")
+@problem_options
 @limit_options
 @output_options
 @session_command
@@ -36,6 +37,8 @@ def command(
 
     require_place(session, form, {}, output, check=check)
     sources = [session.read(path) for path in (file, *others)]
-    tree = import_tree(sources[0], sources[1:], session.report, session.limits, namespace)
+    first, *rest = sources
+    report, limits, reading = session.report, session.limits, session.reading
+    tree = import_tree(first, rest, report, limits, namespace=namespace, reading=reading)
     artefact = export_tree(tree, form, {}, session.limits)
     session.write(output, artefact, check=check, depfile=depfile)
