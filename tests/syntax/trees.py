@@ -29,9 +29,9 @@ _ODD = [
 ]
 _RESERVED = {*CONNECTIVES, "either", "scale-up", "scale-down", "invariant"}
 _BODIES = {"sequence", "fallback", "skipper", "condition", "action", "foreach"}
-WORDS = st.one_of(
-    st.sampled_from(_ODD), st.from_regex(r"\A[A-Za-z_][A-Za-z0-9_.*+@#$%!~-]{0,8}[A-Za-z0-9_]\Z")
-).filter(lambda word: word.lower() not in _RESERVED)
+WORDS = st.one_of(st.sampled_from(_ODD), st.from_regex(r"\A[A-Za-z0-9_.*+@#$%!~-]{1,9}\Z")).filter(
+    lambda word: word.lower() not in _RESERVED and word not in {"-", "*", "+"}
+)
 names = WORDS.map(lambda text: ast.Name(text, S))
 # An object in an equation must not look like a number.
 objects = st.from_regex(r"\A[A-Za-z_][a-z0-9]{0,5}\Z").map(lambda text: ast.Name(text, S))
