@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from bbtc.diagnostics import Diagnostic, Report
 from bbtc.limits import Limits
-from bbtc.source import SourceFile
+from bbtc.source import Reading, SourceFile
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -42,8 +42,15 @@ Probability: TypeAlias = "Fraction | float | str"
 """An exact probability. A float stands for the decimal it prints as: 0.9 is nine tenths."""
 
 
-def load(*sources: Source, limits: Limits | None = None, report: Report | None = None) -> Model:
-    """The domain, and the problem if there is one, that files hold: names resolved, still lifted.
+def load(
+    *sources: Source,
+    problem: str | None = None,
+    lenient: bool = False,
+    limits: Limits | None = None,
+    report: Report | None = None,
+) -> Model:
+    """The domain, and the problem if there is one, that files hold: names resolved, still lifted. Of several
+    problems, ``problem`` names one; ``lenient`` lets names through that seem misspelt, as planners do.
 
     Doubts go to ``report``. Raises :class:`BbtcError` for files that cannot be read and with
     everything that is wrong in them.
@@ -53,22 +60,23 @@ def load(*sources: Source, limits: Limits | None = None, report: Report | None =
     report = Report() if report is None else report
     documents = pipeline.parse_all(_read(sources, limits), report, limits)
     report.raise_errors()
-    inputs = pipeline.select(documents, report)
+    reading = Reading(problem, lenient)
+    inputs = pipeline.select(documents, report, reading)
     report.raise_errors()
     assert inputs is not None
-    return pipeline.resolve_model(inputs, report, checks=True)
+    return pipeline.resolve_model(inputs, report, reading, checks=True)
 
 
-def check(*sources: Source, limits: Limits | None = None) -> list[Diagnostic]:
+def check(*sources: Source, lenient: bool = False, limits: Limits | None = None) -> list[Diagnostic]:
     """Everything that is wrong or doubtful in domains and problems, in order of their places; each
-    problem is checked with the domain of its name. Raises :class:`BbtcError` only for files that
-    cannot be read."""
+    problem is checked with the domain of its name; ``lenient`` as in :func:`load`. Raises
+    :class:`BbtcError` only for files that cannot be read."""
     from bbtc import pipeline
 
     report = Report()
     documents = pipeline.parse_all(_read(sources, limits), report, limits)
     if not report.errors:
-        pipeline.check_documents(documents, report, limits)
+        pipeline.check_documents(documents, report, Reading(lenient=lenient), limits)
     return list(report)
 
 
@@ -80,10 +88,14 @@ def format_text(source: Source) -> str:
 
 
 def compile(  # noqa: A001 - the name of the command
-    *inputs: Source | Model, limits: Limits | None = None, report: Report | None = None
+    *inputs: Source | Model,
+    problem: str | None = None,
+    lenient: bool = False,
+    limits: Limits | None = None,
+    report: Report | None = None,
 ) -> Task:
     """The ground task of a domain and a problem (or of a model that has both), or the one that a
-    compiled file holds.
+    compiled file holds; ``problem`` and ``lenient`` as in :func:`load`.
 
     Raises :class:`BbtcError` with everything that is wrong, and :class:`LimitReached`.
     """
@@ -94,13 +106,13 @@ def compile(  # noqa: A001 - the name of the command
     limits = limits or Limits()
     models = [each for each in inputs if isinstance(each, Model)]
     if models:
-        if len(inputs) > 1:
+        if len(inputs) > 1 or problem is not None:
             raise TypeError("a model stands alone: it holds its domain and its problem")
         return pipeline.ground_model(models[0], report, limits)
     sources = _read([each for each in inputs if not isinstance(each, Model)], limits)
     if not sources:
         raise TypeError("give a domain and a problem, or a model")
-    return pipeline.task_of_sources(sources, report, limits)
+    return pipeline.task_of_sources(sources, report, limits, Reading(problem, lenient))
 
 
 def plan(
@@ -110,6 +122,8 @@ def plan(
     max_actions: int | None = None,
     retries: Retries = "least",
     guarded: bool = False,
+    problem: str | None = None,
+    lenient: bool = False,
     limits: Limits | None = None,
     report: Report | None = None,
     progress: Callable[[Refinement], None] | None = None,
@@ -118,7 +132,8 @@ def plan(
 
     ``strategy`` is ``advised`` (the default), ``auto``, ``search``, ``policy`` or ``refine``;
     ``max_actions`` bounds the actions of every run; ``guarded`` trees check preconditions and the goal in
-    worlds that others change, too; ``progress`` is told each refinement as it is made.
+    worlds that others change, too; ``problem`` and ``lenient`` as in :func:`load`; ``progress`` is told
+    each refinement as it is made.
     The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
     Raises :class:`BbtcError` for input that is wrong and an unknown strategy, :class:`LimitReached` where the
     limits allow no tree at all, and ``ValueError`` for a target that is no probability.
@@ -130,7 +145,7 @@ def plan(
     limits = limits or Limits()
     options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
     tell = progress or (lambda _: None)
-    task = _task(inputs, limits, report)
+    task = _task(inputs, limits, report, Reading(problem, lenient))
     return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)
 
 
@@ -138,6 +153,8 @@ def bounds(
     *inputs: Source | Model | Task,
     max_actions: int | None = None,
     costs: bool = False,
+    problem: str | None = None,
+    lenient: bool = False,
     limits: Limits | None = None,
     report: Report | None = None,
 ) -> TaskValue:
@@ -147,7 +164,8 @@ def bounds(
     from bbtc.plan.options import Options
 
     limits = limits or Limits()
-    return task_value(_task(inputs, limits, report), limits, Options(max_actions=max_actions), costs=costs)
+    task = _task(inputs, limits, report, Reading(problem, lenient))
+    return task_value(task, limits, Options(max_actions=max_actions), costs=costs)
 
 
 def load_tree(source: Source, *, limits: Limits | None = None) -> Tree:
@@ -225,19 +243,25 @@ def import_tree(
     *task: Source,
     namespace: str = "",
     tree: str | None = None,
+    problem: str | None = None,
+    lenient: bool = False,
     limits: Limits | None = None,
     report: Report | None = None,
 ) -> Tree:
     """The tree of an exported file, also of one that was edited, as ``bbtc import`` reads it; ``task`` is its
-    domain and problem, its compiled task, or the tree it was exported from; ``tree`` is the id of the
-    BehaviorTree to read, of a file with several that nobody calls. Where the file claims
+    domain and problem (``problem`` and ``lenient`` as in :func:`load`), its compiled task, or the tree it was
+    exported from; ``tree`` is the id of the BehaviorTree to read, of a file with several that nobody calls.
+    Where the file claims
     figures that the tree does not have, a note goes to ``report``. Raises :class:`BbtcError` with
     everything that cannot be read, and :class:`LimitReached`."""
     from bbtc import pipeline
 
     (source,), others = _read([file], limits), _read(task, limits)
-    doubts = Report() if report is None else report
-    return pipeline.import_tree(source, others, doubts, limits or Limits(), namespace, main=tree)
+    doubts, reading = Report() if report is None else report, Reading(problem, lenient)
+    limits = limits or Limits()
+    return pipeline.import_tree(
+        source, others, doubts, limits, namespace=namespace, main=tree, reading=reading
+    )
 
 
 def export(
@@ -302,14 +326,16 @@ def _read(sources: Sequence[Source], limits: Limits | None) -> list[SourceFile]:
     return [s if isinstance(s, SourceFile) else read_source(os.fspath(s), most) for s in sources]
 
 
-def _task(inputs: Sequence[Source | Model | Task], limits: Limits, report: Report | None) -> Task:
+def _task(
+    inputs: Sequence[Source | Model | Task], limits: Limits, report: Report | None, reading: Reading
+) -> Task:
     from bbtc.ground.task import Task
 
     tasks = [each for each in inputs if isinstance(each, Task)]
     if not tasks:
         rest = [each for each in inputs if not isinstance(each, Task)]
-        return compile(*rest, limits=limits, report=report)
-    if len(inputs) > 1:
+        return compile(*rest, problem=reading.problem, lenient=reading.lenient, limits=limits, report=report)
+    if len(inputs) > 1 or reading.problem is not None:
         raise TypeError("a task stands alone: it holds everything there is to plan for")
     return tasks[0]
 

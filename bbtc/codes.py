@@ -60,6 +60,7 @@ CODES: dict[str, str] = {
     "BBT0226": "section given twice",
     "BBT0227": "predicate with the name of a test",
     "BBT0228": "name with a meaning of its own",
+    "BBT0230": "name that only a lenient reading takes",
     # 03xx: checks
     "BBT0301": "unused predicate",
     "BBT0302": "unreachable action",

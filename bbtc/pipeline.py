@@ -16,7 +16,7 @@ from bbtc.limits import Limits
 from bbtc.model.domain import Model
 from bbtc.plan.options import DEFAULTS, Options
 from bbtc.rounding import figure_text
-from bbtc.source import SourceFile
+from bbtc.source import AS_WRITTEN, Reading, SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import Status, Tree
 
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from bbtc.export.registry import Artefact
     from bbtc.plan.result import Plan, Progress
     from bbtc.verify.verdict import Engine, Verdict
+
+
+_MOST_LISTED = 8  # problems that a hint names
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,14 +51,16 @@ def parse_all(
     return tuple(parse(source, report, depth) for source in sources)
 
 
-def select(documents: Sequence[Document], report: Report) -> Inputs | None:
-    """The one domain and the one problem (or none) that the files hold; None and an error in the
-    report if there is no domain, or more than one of either."""
+def select(documents: Sequence[Document], report: Report, reading: Reading = AS_WRITTEN) -> Inputs | None:
+    """The one domain and the one problem (or none) that the files hold, or that ``reading`` names; None
+    and an error in the report if there is no domain, or more than one of either."""
     found: dict[str, list[Definition]] = {"domain": [], "problem": []}
     for document in documents:
         for definition in document.definitions:
             found[definition.kind].append(definition)
     names = ", ".join(document.source.name for document in documents)
+    if reading.problem is not None and not _narrow(found, reading.problem, names, report):
+        return None
     if not found["domain"]:
         report.error("BBT0006", f"no domain in {names}", hint="give the domain's file, too")
     for kind, definitions in found.items():
@@ -64,7 +69,7 @@ def select(documents: Sequence[Document], report: Report) -> Inputs | None:
                 "BBT0006",
                 f"more than one {kind} in {names}",
                 definitions[1].name.span,
-                hint=f"give exactly one {kind}",
+                hint=f"give exactly one {kind}" if kind == "domain" else f"name it: {_listed(definitions)}",
                 related=[Related("the first one is here", definitions[0].name.span)],
             )
     if len(found["domain"]) != 1 or len(found["problem"]) > 1:
@@ -72,13 +77,37 @@ def select(documents: Sequence[Document], report: Report) -> Inputs | None:
     return Inputs(found["domain"][0], found["problem"][0] if found["problem"] else None)
 
 
-def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
+def _narrow(found: dict[str, list[Definition]], name: str, names: str, report: Report) -> bool:
+    """Leave the problems of a name, and of several domains the one that they are for; False and an error
+    where there is no such problem."""
+    problems = found["problem"]
+    found["problem"] = [problem for problem in problems if problem.name.key == name.lower()]
+    if not found["problem"]:
+        from difflib import get_close_matches
+
+        near = get_close_matches(name.lower()[:100], [problem.name.key for problem in problems], 1)
+        hint = f"did you mean `{near[0]}`?" if near else f"there is {_listed(problems)}" if problems else None
+        report.error("BBT0006", f"no problem `{name[:100]}` in {names}", hint=hint)
+        return False
+    if len(found["domain"]) > 1:
+        wanted = {s.name.key for s in found["problem"][0].sections if isinstance(s, DomainReference)}
+        found["domain"] = [d for d in found["domain"] if d.name.key in wanted] or found["domain"]
+    return True
+
+
+def _listed(problems: Sequence[Definition]) -> str:
+    """The options that choose the problems."""
+    shown = ", ".join(f"--problem {problem.name.text}" for problem in problems[:_MOST_LISTED])
+    return shown if len(problems) <= _MOST_LISTED else f"{shown} …"
+
+
+def resolve_model(inputs: Inputs, report: Report, reading: Reading = AS_WRITTEN, *, checks: bool) -> Model:
     """Names resolved and, with ``checks``, the doubtful reported (what is only noted is left to
     ``bbtc check``). Raises :class:`BbtcError`."""
     from bbtc.analysis.check import check
     from bbtc.analysis.resolve import resolve
 
-    model = resolve(inputs.domain, inputs.problem, report)
+    model = resolve(inputs.domain, inputs.problem, report, lenient=reading.lenient)
     report.raise_errors()
     assert model is not None
     if checks:
@@ -89,7 +118,12 @@ def resolve_model(inputs: Inputs, report: Report, *, checks: bool) -> Model:
     return model
 
 
-def check_documents(documents: Iterable[Document], report: Report, limits: Limits | None = None) -> None:
+def check_documents(
+    documents: Iterable[Document],
+    report: Report,
+    reading: Reading = AS_WRITTEN,
+    limits: Limits | None = None,
+) -> None:
     """Everything that is wrong or doubtful in domains and problems, to the report. Each problem is checked
     with the domain of its name; what rests on one problem is a warning only where it holds for all of
     its domain's. What is right but cannot be grounded is noted. Whether a goal can be reached at all is
@@ -126,7 +160,7 @@ def check_documents(documents: Iterable[Document], report: Report, limits: Limit
         for each in its_problems or [None]:
             # A report of its own: the errors of one problem do not hide the checks of the next.
             own = Report()
-            model = resolve(domain, each, own)
+            model = resolve(domain, each, own, lenient=reading.lenient)
             models.extend([] if model is None else [model])
             for diagnostic in own:
                 report.add(diagnostic)
@@ -185,7 +219,12 @@ def format_source(source: SourceFile) -> str:
 
 
 def compile_sources(
-    sources: Sequence[SourceFile], report: Report, limits: Limits, *, checks: bool = False
+    sources: Sequence[SourceFile],
+    report: Report,
+    limits: Limits,
+    reading: Reading = AS_WRITTEN,
+    *,
+    checks: bool = False,
 ) -> Task:
     """From text to ground task; with ``checks``, what is doubtful is reported on the way.
 
@@ -193,13 +232,13 @@ def compile_sources(
     """
     documents = parse_all(sources, report, limits)
     report.raise_errors()
-    inputs = select(documents, report)
+    inputs = select(documents, report, reading)
     report.raise_errors()
     assert inputs is not None
     if inputs.problem is None:
         names = ", ".join(source.name for source in sources)
         raise BbtcError.single("BBT0006", f"no problem in {names}", hint="give the problem's file, too")
-    model = resolve_model(inputs, report, checks=checks)
+    model = resolve_model(inputs, report, reading, checks=checks)
     try:
         return ground_model(model, report, limits)
     except BbtcError:
@@ -209,17 +248,23 @@ def compile_sources(
         raise
 
 
-def task_of_sources(sources: Sequence[SourceFile], report: Report, limits: Limits) -> Task:
+def task_of_sources(
+    sources: Sequence[SourceFile], report: Report, limits: Limits, reading: Reading = AS_WRITTEN
+) -> Task:
     """The task that files hold: one compiled task as JSON, or a domain and a problem. What is
     doubtful in the latter goes to the report. Raises :class:`BbtcError` or ``LimitReached``."""
     from bbtc.artefacts import load_task
     from bbtc.artefacts.kinds import is_artefact
 
     if not is_artefact(sources[0]):
-        return compile_sources(sources, report, limits, checks=True)
+        return compile_sources(sources, report, limits, reading, checks=True)
     if len(sources) > 1:
         raise BbtcError.single("BBT0006", "a compiled task stands alone", hint="leave the other file out")
-    return load_task(sources[0])
+    task = load_task(sources[0])
+    if reading.problem is not None and reading.problem.lower() != task.problem.lower():
+        message = f"no problem `{reading.problem[:100]}` in {sources[0].name}"
+        raise BbtcError.single("BBT0006", message, hint=f"it holds `{task.problem}` alone")
+    return task
 
 
 def import_tree(
@@ -227,9 +272,10 @@ def import_tree(
     others: Sequence[SourceFile],
     report: Report,
     limits: Limits,
-    namespace: str = "",
     *,
+    namespace: str = "",
     main: str | None = None,
+    reading: Reading = AS_WRITTEN,
 ) -> Tree:
     """The tree of an exported BehaviorTree.CPP file or of a tree artefact, by hand edited ones too. Its
     task is that of ``others``: a domain and a problem, a compiled task, or another tree; without them
@@ -245,7 +291,7 @@ def import_tree(
 
     if not is_xml(source) and not is_artefact(source):
         load_tree(source)  # tells what it is instead
-    task = _task_for_import(others, report, limits)
+    task = _task_for_import(others, report, limits, reading)
     if not is_xml(source):
         if main is not None:
             message = f"{source.name} holds one tree, which has no name"
@@ -260,7 +306,9 @@ def import_tree(
     return _with_figures(imported, source, report, limits)
 
 
-def _task_for_import(others: Sequence[SourceFile], report: Report, limits: Limits) -> Task | None:
+def _task_for_import(
+    others: Sequence[SourceFile], report: Report, limits: Limits, reading: Reading
+) -> Task | None:
     from bbtc.artefacts import load_tree
     from bbtc.artefacts.kinds import is_artefact, is_tree
 
@@ -268,7 +316,7 @@ def _task_for_import(others: Sequence[SourceFile], report: Report, limits: Limit
         return None
     if len(others) == 1 and is_artefact(others[0]) and is_tree(others[0]):
         return load_tree(others[0]).task
-    return task_of_sources(others, report, limits)
+    return task_of_sources(others, report, limits, reading)
 
 
 def _with_figures(imported: Imported, source: SourceFile, report: Report, limits: Limits) -> Tree:

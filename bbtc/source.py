@@ -11,6 +11,18 @@ from bbtc.printable import printable_line
 _EXCERPT_WIDTH = 160
 
 
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How to read files: which of several problems is meant (by name), and whether names that are declared
+    nowhere are let through where planners read them (``lenient``)."""
+
+    problem: str | None = None
+    lenient: bool = False
+
+
+AS_WRITTEN = Reading()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SourceFile:
     """A text and the name it is shown under (a path as the user gave it, or ``<stdin>``)."""

@@ -54,6 +54,13 @@ HOSTILE_NAMES = st.one_of(
             "a,b",
             "f(x",
             "",
+            "next\x85line",
+            "\u2028\u2029",
+            "\ufeff",
+            " around ",
+            "yes",
+            "~",
+            "1e3",
         ]
     ),
     st.text(st.characters(exclude_categories=["Cs"]), max_size=8),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import replace
 from typing import TypeVar
 
@@ -10,6 +10,7 @@ from bbtc.analysis.names import Declared, Names, Signature
 from bbtc.diagnostics import Related, Report
 from bbtc.model.domain import Function, Predicate
 from bbtc.model.types import OBJECT, Object, Type, TypeHierarchy
+from bbtc.source import Span
 from bbtc.syntax import ast
 
 S = TypeVar("S", bound=ast.Section)
@@ -18,6 +19,10 @@ S = TypeVar("S", bound=ast.Section)
 def sections(definition: ast.Definition, kind: type[S]) -> Iterator[S]:
     """The sections of one kind, in source order."""
     return (section for section in definition.sections if isinstance(section, kind))
+
+
+GOAL_FLUENTS = frozenset({"goal-probability", "goal-achieved"})
+"""What a metric may maximise besides a reward: every plan is made for it anyway."""
 
 
 def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None) -> None:
@@ -67,17 +72,18 @@ def twice(
 def _types(names: Names, domain: ast.Definition) -> TypeHierarchy:
     found: dict[str, Type] = {}
     parents: dict[str, dict[str, ast.Name]] = {}
-    for section in sections(domain, ast.TypedSection):
-        if section.kind == "types":
-            for group in section.entries:
-                for name in group.names:
-                    found.setdefault(name.key, Type(name.key, (), name.span))
-                    above = parents.setdefault(name.key, {})
-                    for parent in group.types:
-                        if parent.key != name.key:
-                            above[parent.key] = parent
-                        elif name.key != OBJECT:
-                            _refuse_own_parent(names, group, name)
+    lists = [section for section in sections(domain, ast.TypedSection) if section.kind == "types"]
+    known = {OBJECT, *(kind.key for section in lists for group in section.entries for kind in group.types)}
+    for section in lists:
+        for group in _with_spaces(section.entries, known):
+            for name in group.names:
+                found.setdefault(name.key, Type(name.key, (), name.span))
+                above = parents.setdefault(name.key, {})
+                for parent in group.types:
+                    if parent.key != name.key:
+                        above[parent.key] = parent
+                    elif name.key != OBJECT:
+                        _refuse_own_parent(names, group, name)
     # A supertype need not be declared itself: `car - vehicle` is read as declaring both.
     for above in list(parents.values()):
         for key, parent in above.items():
@@ -132,11 +138,42 @@ def _refuse_cycles(names: Names, parents: dict[str, dict[str, ast.Name]], found:
 # --- objects, predicates, functions -----------------------------------------------------------
 
 
+def _with_spaces(entries: ast.TypedList, types: Container[str]) -> Iterator[ast.TypedGroup]:
+    """The groups of a list of names in which a hyphen may lack a space: `a -room` and `a- room`, where
+    ``room`` is a type, are `a - room`. Elsewhere a hyphen is a letter as any other."""
+    for group in entries:
+        if not any(name.text[0] == "-" or name.text[-1] == "-" for name in group.names):
+            yield group
+            continue
+        pending: list[ast.Term] = []
+        left = list(reversed(group.names))
+        while left:
+            name = left.pop()
+            if name.text[0] == "-" and pending and name.key[1:] in types:
+                kind = _part(name, 1, None)
+            elif name.text[-1] == "-" and left and left[-1].key in types and len(name.text) > 1:
+                pending.append(_part(name, 0, -1))
+                kind = _part(left.pop(), 0, None)
+            else:
+                pending.append(name)
+                continue
+            yield ast.TypedGroup(tuple(pending), (kind,), group.span)
+            pending = []
+        if pending:
+            yield ast.TypedGroup(tuple(pending), group.types, group.span)
+
+
+def _part(name: ast.Term, first: int, last: int | None) -> ast.Name:
+    source, start, _ = name.span
+    text = name.text[first:last]
+    return ast.Name(text, Span(source, start + first, start + first + len(text)))
+
+
 def _objects(names: Names, section: ast.TypedSection) -> None:
     names.section = "objects"
     kind = "constant" if section.kind == "constants" else "object"
     objects = names.objects
-    for group in section.entries:
+    for group in _with_spaces(section.entries, names.hierarchy.types):
         types = names.types(group.types)
         for name in group.names:
             key = name.key
@@ -191,12 +228,17 @@ def _functions(names: Names, domain: ast.Definition) -> None:
 
 def _fluents(names: Names, problem: ast.Definition | None) -> None:
     """The fluents that count cost and reward: ``total-cost`` and ``reward``, and the one a metric
-    minimises or maximises, which then counts in their place."""
+    minimises or maximises, which then counts in their place. Where it minimises ``total-time``, which is the
+    number of actions if no domain declares it (PDDL 2.1, 3.1), nothing counts in the place of 1 an action."""
     costs, rewards, counted = set(names.costs), set(names.rewards), set(names.counted)
     for metric in sections(problem, ast.Metric) if problem is not None else ():
         if isinstance(metric.expression, ast.FluentRef) and not metric.expression.args:
             key = metric.expression.name.key
-            if metric.direction == "minimize" and key not in rewards and key != "total-time":
+            if metric.direction == "minimize" and key == "total-time" and key not in names.functions:
+                counted = counted - costs
+            elif key in GOAL_FLUENTS and key not in names.functions:
+                continue
+            elif metric.direction == "minimize" and key not in rewards:
                 counted = (counted - costs) | {key}
                 costs.add(key)
             elif metric.direction == "maximize" and key not in costs:

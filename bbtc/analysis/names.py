@@ -79,6 +79,8 @@ class Names:
     """Keys of the predicates that have rules."""
     in_problem: bool = False
     """What is being read is the problem's."""
+    lenient: bool = False
+    """Names that are taken for slips are read as what they say, with a warning."""
     _told: set[tuple[str, str, str]] = field(default_factory=set)
     _known: dict[str, dict[str, Declared]] = field(default_factory=dict)
     _inferred: dict[tuple[str, str], None] = field(default_factory=dict)
@@ -169,6 +171,12 @@ class Names:
         hint = reading if near is None else f"{reading}; did you mean `{near}`?"
         self.report.warning("BBT0225", f"{kind} `{name.text}` is not declared", name.span, hint)
 
+    def _let_through(self, kind: str, name: ast.Term, reading: str, near: str | None) -> None:
+        """Say of a name that only a lenient reading takes what it is taken for."""
+        self._inferred[kind, name.key] = None
+        hint = reading if near is None else f"{reading}; did you mean `{near}`?"
+        self.report.warning("BBT0230", f"{kind} `{name.text}` is not declared", name.span, hint)
+
     def finish(self) -> None:
         """Count what is taken as declared beyond the names that were told one by one."""
         for kind, name in self._told_in_sum.items():
@@ -196,13 +204,16 @@ class Names:
             return None
         near, alone = self._slip("predicate", key, known, len(args)), self._stands_alone(key)
         if (alone and (near is not None or key not in self.uses.given)) or key in self.hierarchy.types:
-            self.unknown("BBT0202", "predicate", name, known)
-            return None
+            if not self.lenient:
+                self.unknown("BBT0202", "predicate", name, known)
+                return None
+            self._let_through("predicate", name, "it is a predicate of its own", near)
         parameters = tuple(Parameter(f"?{number}") for number in range(1, len(args) + 1))
         derived = key in self.derived
         self.predicates[key] = Predicate(key, parameters, derived=derived, span=name.span, inferred=True)
         where = f"with {_count(len(args))}" if args else "without arguments"
-        self._infer("predicate", name, f"it is taken as a predicate {where}", near)
+        if ("predicate", key) not in self._inferred:
+            self._infer("predicate", name, f"it is taken as a predicate {where}", near)
         return self.predicates[key]
 
     def _no_predicate(self, key: str, args: Sequence[ast.Term]) -> str | None:
@@ -315,7 +326,7 @@ class Names:
                 return parameter.name, parameter.types
             self.unknown("BBT0204", "parameter", term, scope)
             return None
-        if key not in self.objects or ("object", key) in self._inferred:
+        if (key not in self.objects or ("object", key) in self._inferred) and not self.lenient:
             if f"?{key}" in scope:
                 meant = f"did you mean the parameter `?{term.text}`?"
                 self.unknown("BBT0203", "object", term, self.objects, meant)
@@ -323,7 +334,13 @@ class Names:
             self._inferred_object(term, wanted)
         thing = self.objects.get(key)
         if thing is not None:
-            return key, thing.types
+            return key, thing.types or (_NO_TYPE,)
+        if self.lenient:
+            # An object without a type: no parameter and no quantifier takes it.
+            near = self._slip("object", key, self._declared("object", self.objects))
+            self.objects[key] = Object(key, (), term.span)
+            self._let_through("object", term, "it is an object of its own that no parameter takes", near)
+            return key, (_NO_TYPE,)
         self.unknown("BBT0203", "object", term, self.objects)
         return None
 

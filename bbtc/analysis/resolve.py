@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing_extensions import assert_never
 
 from bbtc.analysis import bodies, facts, formulas, truth_words
-from bbtc.analysis.declare import declare, sections
+from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
 from bbtc.diagnostics import Related, Report
@@ -28,15 +28,18 @@ _SEVERAL = (ast.Action, ast.Derived, ast.Sensor, ast.Template, ast.Hidden)
 _DOMAIN_ONLY = (ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template)
 
 
-def resolve(domain: ast.Definition, problem: ast.Definition | None, report: Report) -> md.Model | None:
-    """The model of a domain, with a problem or alone (to check it).
+def resolve(
+    domain: ast.Definition, problem: ast.Definition | None, report: Report, *, lenient: bool = False
+) -> md.Model | None:
+    """The model of a domain, with a problem or alone (to check it); ``lenient`` as in
+    :class:`bbtc.source.Reading`.
 
     Errors go to ``report``, all of them; the result is None if it holds any. Probabilities whose
     sum differs from 1 by at most 1e-9 are taken as rounded and divided by their sum; a smaller sum
     gets an explicit no-change branch.
     """
     definitions = (domain,) if problem is None else (domain, problem)
-    names = Names(report, definitions=definitions)
+    names = Names(report, definitions=definitions, lenient=lenient)
     _check_sections(report, domain, problem)
     declare(names, domain, problem)
     schemas: dict[str, md.Schema] = {}
@@ -301,7 +304,6 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
         else:
             probability = value
     metric = next(sections(problem, ast.Metric), None)
-    maximise = metric is not None and metric.direction == "maximize"
     if metric is not None:
         _check_metric(names, metric)
     return replace(
@@ -312,7 +314,7 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
         goal_span=goal_span,
         goal_probability=probability,
         goal_reward=reward,
-        metric="reward" if maximise else "cost",
+        metric="cost" if metric is None or not _is_reward(names, metric) else "reward",
         problem_span=problem.name.span,
     )
 
@@ -350,19 +352,29 @@ def _goal_formula(names: Names, model: md.Model, node: ast.Formula) -> mf.Formul
     return formulas.formula(names, node, {})
 
 
+def _is_reward(names: Names, metric: ast.Metric) -> bool:
+    fluent = metric.expression
+    return (
+        metric.direction == "maximize"
+        and isinstance(fluent, ast.FluentRef)
+        and (fluent.name.key not in GOAL_FLUENTS or fluent.name.key in names.functions)
+    )
+
+
 def _check_metric(names: Names, metric: ast.Metric) -> None:
-    expression = metric.expression
+    """Refuse a metric that is not what is counted."""
+    expression, minimise = metric.expression, metric.direction == "minimize"
+    hint = "a metric names one fluent: `(:metric minimize (total-cost))`, `(:metric maximize (reward))`"
     if isinstance(expression, ast.FluentRef) and not expression.args:
-        key = expression.name.key
-        if key in (names.costs if metric.direction == "minimize" else names.rewards):
-            if key not in names.functions and key not in ("total-cost", "reward"):
+        key, declared = expression.name.key, expression.name.key in names.functions
+        if not declared and (key == "total-time" if minimise else key in GOAL_FLUENTS):
+            return
+        if not declared and key in GOAL_FLUENTS:
+            hint = "the goal's probability can only be maximised"
+        elif not declared and key == "total-time":
+            hint = "the number of actions can be minimised: `(:metric minimize (total-time))`"
+        elif key in (names.costs if minimise else names.rewards):
+            if not declared and key not in ("total-cost", "reward"):
                 names.unknown("BBT0220", "function", expression.name, names.functions)
             return
-        if key in ("total-time", "goal-probability", "goal-achieved"):
-            return
-    names.report.error(
-        "BBT0212",
-        "this metric is not supported",
-        metric.span,
-        "a metric names one fluent: `(:metric minimize (total-cost))`, `(:metric maximize (reward))`",
-    )
+    names.report.error("BBT0212", "this metric is not supported", metric.span, hint)

@@ -113,7 +113,7 @@ def _perform(job: Job, report: Report) -> Made:
 def _plan(job: Job, report: Report, limits: Limits) -> Plan:
     entry = job.entry
     sources = [decode_source(name, data) for name, data in job.sources]
-    task = pipeline.task_of_sources(sources, report, limits)
+    task = pipeline.task_of_sources(sources, report, limits, entry.reading)
     options = Options(max_actions=entry.max_actions, retries=entry.retries, guarded=entry.guarded)
     plan = pipeline.plan_task(task, entry.target, entry.strategy, limits, lambda _: None, options=options)
     if plan.tree.status == "interrupted":

@@ -179,7 +179,8 @@ class _Builder:
         versions = self.state.versions
         tool = versions["bbtc"]
         options = (entry.strategy, entry.max_actions, entry.retries, entry.guarded)
-        planned = (entry.inputs, entry.target, options, entry.limits)
+        reading = (entry.reading.problem, entry.reading.lenient)
+        planned = (entry.inputs, reading, entry.target, options, entry.limits)
         steps = {TREE: Step(settings_digest(tool, planned, entry.file), {}, {})}
         if entry.expect:
             expected = [expectation.text for expectation in entry.expect]

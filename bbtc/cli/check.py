@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import click
 
-from bbtc.cli.session import Session, reading_limits
+from bbtc.cli.session import Session, lenient_option, reading_limits
 from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
 from bbtc.diagnostics import Diagnostic, Report, Severity
@@ -45,6 +45,7 @@ class CodePrefixes(click.ParamType):  # type: ignore[type-arg,unused-ignore]
     help="Do not show the warnings and notes with these codes. The longer of two prefixes decides.",
 )
 @click.option("--strict", is_flag=True, help="Fail if there are warnings.")
+@lenient_option
 @reading_limits
 @session_command
 def command(
@@ -70,7 +71,7 @@ def command(
     try:
         documents = parse_all([session.read(file) for file in files], report, session.limits)
         if not report.errors:
-            check_documents(documents, report, session.limits)
+            check_documents(documents, report, session.reading, session.limits)
     finally:
         for diagnostic in chosen(report, sum(select, ()), sum(ignore, ())):
             session.report.add(diagnostic)

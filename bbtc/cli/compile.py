@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from bbtc.cli.session import Session, grounding_limits, output_options
+from bbtc.cli.session import Session, grounding_limits, output_options, problem_options
 from bbtc.cli.session import command as session_command
 
 
@@ -18,6 +18,7 @@ from bbtc.cli.session import command as session_command
     help="What to write: the syntax trees, the resolved model, the ground task, or the task as a Markov "
     "decision process for model checkers.",
 )
+@problem_options
 @grounding_limits
 @output_options
 @session_command
@@ -35,7 +36,8 @@ def command(
     session.expect_output(output, files, check=check, depfile=depfile)
     sources = [session.read(file) for file in files]
     if emit in {"ground", "prism", "jani"}:
-        task = pipeline.compile_sources(sources, session.report, session.limits, checks=True)
+        reading = session.reading
+        task = pipeline.compile_sources(sources, session.report, session.limits, reading, checks=True)
         if emit == "ground":
             text = artefacts.dumps(artefacts.task_to_json(task))
         else:
@@ -50,9 +52,9 @@ def command(
         if emit == "ast":
             text = artefacts.dumps(artefacts.syntax_to_json(documents))
         else:
-            inputs = pipeline.select(documents, session.report)
+            inputs = pipeline.select(documents, session.report, session.reading)
             session.report.raise_errors()
             assert inputs is not None
-            model = pipeline.resolve_model(inputs, session.report, checks=True)
+            model = pipeline.resolve_model(inputs, session.report, session.reading, checks=True)
             text = artefacts.dumps(artefacts.model_to_json(model))
     session.write(output, text, check=check, depfile=depfile)

@@ -14,6 +14,7 @@ from bbtc.cli.session import (
     Session,
     limit_options,
     output_options,
+    problem_options,
 )
 from bbtc.cli.session import (
     command as session_command,
@@ -55,6 +56,7 @@ def _list_formats(ctx: click.Context, _parameter: click.Parameter, value: bool) 
 @click.option("--target", type=Probability(), help="With DOMAIN: wanted success probability.")
 @click.option("--strategy", default=DEFAULT, show_default=True, help="With DOMAIN: how to plan.")
 @click.option("--verify", "verified", is_flag=True, help="Write only if `bbtc verify` takes the tree.")
+@problem_options
 @limit_options
 @output_options
 @session_command

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from bbtc.cli.export import require_place
-from bbtc.cli.session import Session, limit_options, output_options
+from bbtc.cli.session import Session, limit_options, output_options, problem_options
 from bbtc.cli.session import command as session_command
 
 
@@ -19,6 +19,7 @@ from bbtc.cli.session import command as session_command
 @click.option(
     "--tree", "main", default=None, metavar="ID", help="The BehaviorTree of FILE to read; see docs/import.md."
 )
+@problem_options
 @limit_options
 @output_options
 @session_command
@@ -40,6 +41,8 @@ def command(
 
     require_place(session, form, {}, output, (file, *others), check=check, depfile=depfile)
     sources = [session.read(path) for path in (file, *others)]
-    tree = import_tree(sources[0], sources[1:], session.report, session.limits, namespace, main=main)
+    first, *rest = sources
+    report, limits, reading = session.report, session.limits, session.reading
+    tree = import_tree(first, rest, report, limits, namespace=namespace, main=main, reading=reading)
     artefact = export_tree(tree, form, {}, session.limits)
     session.write(output, artefact, check=check, depfile=depfile)

@@ -21,7 +21,7 @@ def task_of(session: Session, sources: list[SourceFile], limits: Limits) -> Task
     """The task of files already read. Raises :class:`BbtcError`."""
     from bbtc.pipeline import task_of_sources
 
-    task = task_of_sources(sources, session.report, limits)
+    task = task_of_sources(sources, session.report, limits, session.reading)
     session.clear()
     return task
 

@@ -19,6 +19,7 @@ from bbtc.cli.session import (
     Session,
     limit_options,
     output_options,
+    problem_options,
 )
 from bbtc.cli.session import (
     command as session_command,
@@ -67,6 +68,7 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
 @click.option("--verify", "verified", is_flag=True, help="Write the tree only if `bbtc verify` takes it.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
+@problem_options
 @limit_options
 @output_options
 @session_command

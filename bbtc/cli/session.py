@@ -19,7 +19,7 @@ from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.files import Outputs, require_apart, require_writable
 from bbtc.limits import Limits
 from bbtc.printable import printable
-from bbtc.source import SourceFile
+from bbtc.source import AS_WRITTEN, Reading, SourceFile
 
 if TYPE_CHECKING:
     from bbtc.export.registry import Artefact
@@ -32,14 +32,16 @@ class Session:
     form: str
     limits: Limits
     report: Report = field(default_factory=Report)
+    reading: Reading = AS_WRITTEN
     inputs: list[str] = field(default_factory=list)
     line: ProgressLine | None = None
 
     @classmethod
-    def begun(cls, form: str, limits: Limits) -> Session:
+    def begun(cls, form: str, limits: Limits, reading: Reading) -> Session:
         """A session that shows progress where people can see it."""
         line = ProgressLine.on_terminal() if form == "text" else None
-        return cls(form, limits if line is None else replace(limits, watcher=line.watch), line=line)
+        watched = limits if line is None else replace(limits, watcher=line.watch)
+        return cls(form, watched, reading=reading, line=line)
 
     def clear(self) -> None:
         """Take away what is shown of the progress."""
@@ -133,7 +135,9 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
     def run(ctx: click.Context, own_format: str | None, **arguments: Any) -> None:
         bounds = {key: arguments.pop(key) for key in list(arguments) if key.startswith("limit_")}
         limits = Limits(**{key.removeprefix("limit_"): value for key, value in bounds.items()})
-        session = Session.begun(own_format or ctx.obj["format"], limits)
+        ways = {key: arguments.pop(key) for key in list(arguments) if key.startswith("reading_")}
+        reading = Reading(**{key.removeprefix("reading_"): value for key, value in ways.items()})
+        session = Session.begun(own_format or ctx.obj["format"], limits, reading)
         try:
             status = function(session, **arguments)
         except BbtcError as error:
@@ -184,6 +188,23 @@ def output_options(function: Callable[..., Any]) -> Callable[..., Any]:
     ):
         function = option(function)
     return function
+
+
+lenient_option = click.option(
+    "--lenient",
+    "reading_lenient",
+    is_flag=True,
+    help="Read names that seem misspelt as planners do: as others than those declared.",
+)
+"""An option for every command that reads domains; the value is in :attr:`Session.reading`."""
+
+
+def problem_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """``--problem`` and ``--lenient``, for commands that read one problem."""
+    option = click.option(
+        "--problem", "reading_problem", metavar="NAME", help="Of several problems, this one."
+    )
+    return option(lenient_option(function))
 
 
 _MIB = 1 << 20

@@ -19,7 +19,7 @@ from bbtc.manifest.places import Places
 from bbtc.plan.options import Retries
 from bbtc.plan.strategies import DEFAULT, STRATEGIES
 from bbtc.printable import printable
-from bbtc.source import Span
+from bbtc.source import AS_WRITTEN, Reading, Span
 from bbtc.syntax.reader import decode_source
 
 _T = TypeVar("_T")
@@ -31,8 +31,9 @@ _MOST = 1000  # expectations or exports of one tree
 MOST_VALUES = 250_000
 """Settings, expectations and exports of all trees, those that are shared counted for each."""
 _INPUTS = ("domain", "problem")
+_READING = ("problem-name", "lenient")
 _PLANNING = ("target", "strategy", "max-actions", "retries", "guarded", "limits")
-_SETTINGS = (*_INPUTS, *_PLANNING, "exports", "expect")
+_SETTINGS = (*_INPUTS, *_READING, *_PLANNING, "exports", "expect")
 _LIMITS = {"time": "seconds", "states": "states", "nodes": "nodes", "ground-actions": "actions"}
 
 
@@ -65,6 +66,7 @@ class TreeEntry:
     max_actions: int | None = None
     retries: Retries = "least"
     guarded: bool = False
+    reading: Reading = AS_WRITTEN
     limits: tuple[tuple[str, int], ...] = ()
     exports: tuple[Export, ...] = ()
     expect: tuple[Expectation, ...] = ()
@@ -171,6 +173,7 @@ class _Reader:
             max_actions=optional("max-actions", _count, None),
             retries=optional("retries", _retries, "least"),
             guarded=optional("guarded", At.flag, False),
+            reading=Reading(optional("problem-name", _text, None), optional("lenient", At.flag, False)),
             limits=optional("limits", self._limits, ()),
             exports=optional("exports", lambda each: self._exports(each, name), ()),
             expect=optional("expect", self._expectations, ()),

@@ -80,7 +80,7 @@ def _parameters(entries: ast.TypedList, last: Token) -> ast.TypedList:
         names: list[ast.Term] = []
         for name in group.names:
             short, _, kind = name.text.partition("-")
-            if not kind or name.key in used or short.lower() not in used:
+            if not kind or kind[0] == "-" or name.key in used or short.lower() not in used:
                 names.append(name)
                 continue
             source, start, stop = name.span

@@ -53,8 +53,7 @@ _assign_atom, _assign_value, _assign_span = (_setter(Assign, s) for s in ("atom"
 
 _WORD = re.compile(r"\??[^\s()?]+|\?")
 _LITERAL = re.compile(r"\(([^()]*)\)|\(\s*not\s*(\([^()]*\))\s*\)", re.IGNORECASE)
-# In a typed list a hyphen may lack its spaces: `?x- block`, `-zone`.
-_ENTRY = re.compile(r"-|\??(?:[^\s()?-]|-+(?=[^\s()?-]))+|\?")
+_ENTRY = re.compile(r"\??[^\s()?]+|\?")
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 # A fact whose words stand one space apart, any fact, or the value of a fluent.
 _FACT = re.compile(r"\(([^\s()]+(?: [^\s()]+)*)\)|(\([^()]*\))|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
@@ -128,7 +127,7 @@ def _terms_slowly(text: str, offset: int, source: SourceFile) -> list[Term]:
     for match in _WORD.finditer(text):
         word = match.group()
         span = Span(source, offset + match.start(), offset + match.end())
-        if word[0] == "-" or word == "?":
+        if word in {"-", "?"}:
             hint = "types stand in declarations only" if word == "-" else None
             raise Misuse("BBT0101", f"expected a name or a variable, found `{word}`", span, hint)
         found.append(Variable(word, span) if word[0] == "?" else Name(word, span))
@@ -275,8 +274,7 @@ def groups(text: str, offset: int, *, variables: bool) -> tuple[TypedGroup, ...]
     found: list[TypedGroup] = []
     names: list[Term] = []
     start, typed = offset, False
-    for match in _ENTRY.finditer(text):
-        word, at = match.group(), offset + match.start()
+    for word, at in _entries(text, offset, variables=variables):
         if typed:
             kind = Name(word, Span(source, at, at + len(word)))
             found.append(TypedGroup(tuple(names), (kind,), Span(source, start, at + len(word))))
@@ -296,6 +294,27 @@ def groups(text: str, offset: int, *, variables: bool) -> tuple[TypedGroup, ...]
     if names:
         found.append(TypedGroup(tuple(names), (), Span(source, start, names[-1].span.end)))
     return tuple(found)
+
+
+def _entries(text: str, offset: int, *, variables: bool) -> Iterator[tuple[str, int]]:
+    """The words of a typed list and where they stand. Among variables, a hyphen may lack its spaces, for what
+    has no question mark can only be a type: `?x- block`, `?x -block`."""
+    found = [(match.group(), offset + match.start()) for match in _ENTRY.finditer(text)]
+    if not variables or "-" not in text:
+        yield from found
+        return
+    after_dash = False
+    for (word, at), (following, _) in zip(found, [*found[1:], ("?", 0)], strict=True):
+        if word == "-" or after_dash:
+            yield word, at
+            after_dash = word == "-" and not after_dash
+        elif word[0] == "-":
+            yield from (("-", at), (word[1:], at + 1))
+        elif word[-1] == "-" and following[0] not in "?-":
+            yield from ((word[:-1], at), ("-", at + len(word) - 1))
+            after_dash = True
+        else:
+            yield word, at
 
 
 def _entry(word: str, at: int, source: SourceFile, variables: bool) -> Term:

@@ -162,7 +162,7 @@ class _Writer:
         return edge
 
     def reward(self, command: Command, number: int) -> Json:
-        """The expectation of a reward over the branches, as an expression over the state before; 0 for none."""
+        """The expectation of a reward over the branches, in terms of the state before; 0 for none."""
         total: Json = _number(command.reward(number))
         for when, amount in command.charges(number).items():
             added = {"op": "ite", "if": self.expression(when), "then": _number(amount), "else": 0}

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 import yaml
 from hypothesis import given, settings
 
-from bbtc.artefacts import load_tree
+from bbtc.artefacts import load_tree, tree_to_json
 from bbtc.diagnostics import BbtcError
 from bbtc.export.diagram import diagram
 from bbtc.export.registry import load_exporter, parse_options
@@ -20,6 +23,7 @@ from bbtc.ground.condition import Is
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+from tests.long_form import amount
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 
@@ -167,6 +171,84 @@ def test_json_is_the_artefact_and_yaml_holds_the_same(tree: Tree) -> None:
     text = export(tree, "json")
     assert export(load_tree(SourceFile("tree.json", text)), "json") == text
     assert yaml.safe_load(export(tree, "yaml")) == json.loads(text)
+
+
+TEXTS = [
+    *("yes", "no", "on", "off", "y", "n", "null", "~", "Null", "true", "1e3", "1E3", "-1e3", "0o7", "0x1F"),
+    *("0b11", "1_000", "12:30", "12:30:45", "1.5", "+.5", ".5", "-.inf", ".nan", "=", "<<", "2020-01-01"),
+    *(
+        "2001-12-14t21:59:43.10-05:00",
+        "---",
+        "...",
+        "?",
+        ":",
+        "-",
+        "#",
+        "!",
+        "&",
+        "*",
+        "|",
+        ">",
+        "%",
+        "@",
+        "`",
+    ),
+    *("'", '"', "{", "}", "[", "]", ",", "1e", "0.", "08", "--", "!!str", "&a", "*a", "%YAML", "- a", "? a"),
+    *("a: b", "a #b", " a", "a ", "  ", "a\n", "\na", "a\n\nb", "a" * 300, "b c " * 60, "\\"),
+]
+_CORE = re.compile(
+    r"~|null|Null|NULL|true|True|TRUE|false|False|FALSE|[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+"
+    r"|[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)|"
+)
+"""What a plain text of YAML 1.2 may be besides a string (core schema, 10.3.2)."""
+
+
+def odd_texts() -> list[str]:
+    """Every character that is white, ends a line, controls something or is no character at all, alone and
+    at every place of a text; in the long form every character there is."""
+    kinds = {"Zs", "Zl", "Zp", "Cc", "Cf"}
+    odd = [chr(code) for code in range(0x110000) if unicodedata.category(chr(code)) in kinds]
+    odd += ["\ud800", "\udfff", "\ufdd0", "\ufffe", "\uffff", "\U0001fffe", "\U0010ffff", "\U0001f600"]
+    every = [f"a{chr(code)}b" for code in range(0x110000)] if amount(0, 1) else []
+    return [*every, *(form.format(c) for c in odd for form in ("{}", "{}a", "a{}", "a{}b", "a {} b"))]
+
+
+@pytest.mark.parametrize("form", ["json", "yaml"])
+def test_every_character_of_a_name_survives(form: str) -> None:
+    texts = [*TEXTS, *odd_texts()]
+    nodes = tuple(ConditionNode(f"n{n}", Is(0, Truth.TRUE), name=text) for n, text in enumerate(texts))
+    tree = replace(soda_tree(), root=ControlNode("root", "fallback", nodes))
+    written = export(tree, form)
+    found = json.loads(written) if form == "json" else yaml.safe_load(written)
+    assert [node["name"] for node in found["root"]["children"]] == texts
+    assert found == tree_to_json(tree)
+    if form == "json":
+        return
+    written.encode()  # what is no character stands there as an escape
+    stack: list[Any] = [yaml.compose(written)]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, yaml.ScalarNode):
+            plain = node.style is None and node.tag.endswith(":str")
+            assert not (plain and _CORE.fullmatch(node.value)), f"read as another in YAML 1.2: {node.value}"
+        else:
+            stack += [part for pair in node.value for part in (pair if isinstance(pair, tuple) else (pair,))]
+
+
+@pytest.mark.parametrize("form", ["text", "mermaid", "dot", "btcpp", "svg"])
+def test_a_character_that_does_not_print_is_replaced_where_people_read(form: str) -> None:
+    """No two lines of what was one, nothing unseen, and what prints is as it was."""
+    odd = ("\x85", "\u2028", "\u2029", "\ufeff", "\ud800", "\x00", "\x1b", "\n", "\t", "\uffff")
+    for text in (f"a{each}b" for each in odd):
+        node = ConditionNode("n1", Is(0, Truth.TRUE), name=text)
+        tree = replace(soda_tree(), root=ControlNode("root", "fallback", (node,), name=f"ü→{text}"))
+        written = export(tree, form)
+        written.encode()
+        unseen = {c for c in written if not c.isprintable() and c not in "\n\t"}
+        assert not unseen, (form, text, unseen)
+        assert (text in written) is False
+        if form in {"btcpp", "svg"}:
+            ET.fromstring(written)
 
 
 def test_yaml_refuses_what_is_too_deep_for_its_library() -> None:

@@ -184,6 +184,9 @@ def test_rewards_are_kept_by_outcome() -> None:
         ("(:metric minimize (fuel))", "2", "7"),
         ("(:metric minimize (length))", "0", "7"),
         ("(:metric maximize (joy))", "5", "3"),
+        ("(:metric minimize (total-time))", "1", "7"),
+        ("(:metric minimize total-time)", "1", "7"),
+        ("(:metric maximize (goal-probability))", "5", "7"),
     ],
 )
 def test_only_the_fluent_that_the_metric_names_counts(metric: str, cost: str, reward: str) -> None:
@@ -194,6 +197,42 @@ def test_only_the_fluent_that_the_metric_names_counts(metric: str, cost: str, re
     (action,) = task_of(text).actions
     (outcome,) = action.factors[0].outcomes
     assert (action.cost, outcome.reward) == (Fraction(cost), Fraction(reward))
+
+
+def test_a_total_time_that_the_domain_declares_is_a_fluent_like_any_other() -> None:
+    text = """(define (domain d) (:predicates (p)) (:functions (total-time))
+      (:action go :effect (and (p) (increase (total-time) 4))))
+      (define (problem x) (:domain d) (:init) (:goal (p)) (:metric minimize (total-time)))"""
+    (action,) = task_of(text).actions
+    assert action.cost == 4
+
+
+@pytest.mark.parametrize(
+    "metric",
+    [
+        "maximize (total-cost)",
+        "minimize (reward)",
+        "maximize (total-time)",
+        "minimize (goal-probability)",
+        "minimize (* 2 (total-cost))",
+        "minimize (+ (total-cost) (total-time))",
+        "maximize (- (reward) (total-cost))",
+        "minimize (is-violated p)",
+        "minimize (- (reward))",
+        "minimize 3",
+    ],
+)
+def test_a_metric_that_is_not_what_is_counted_is_refused_at_its_place(metric: str) -> None:
+    with pytest.raises(BbtcError) as caught:
+        _task("(and (p) (increase (total-cost) 1) (increase (reward) 1))", "", f"(:metric {metric})")
+    assert [(each.code, each.span and each.span.text) for each in caught.value.diagnostics] == [
+        ("BBT0212", f"(:metric {metric})")
+    ]
+
+
+def test_a_goal_probability_to_maximise_makes_no_reward_of_the_cost() -> None:
+    text = _EFFECT.format(effect="(p)", init="", metric="(:metric maximize (goal-probability))")
+    assert task_of(text).metric == "cost"
 
 
 def test_costs_and_rewards_under_a_condition_are_charges_of_the_outcome() -> None:

@@ -218,7 +218,8 @@ TYPED_LISTS: dict[str, ast.TypedList] = {
     "a b": (group("a b"),),
     "a b - t c": (group("a b", "t"), group("c")),
     "a - (either t u) b - t": (group("a", "t", "u"), group("b", "t")),
-    "a -t b- u c-d": (group("a", "t"), group("b", "u"), group("c-d")),
+    "a -t b- u c-d": (group("a -t b- u c-d"),),
+    "-a -1 - t b- - -u .c- @d - --": (group("-a -1", "t"), group("b-", "-u"), group(".c- @d", "--")),
 }
 
 SECTIONS: dict[str, ast.Section] = {
@@ -333,6 +334,15 @@ def test_missing_spaces_in_parameters() -> None:
     split = (group("?b", "block"), group("?c-d"))
     assert action(":parameters (?b-block ?c-d) :effect (p ?b ?c-d)").parameters == split
     assert action(":parameters (?loc -zone) :effect (p ?loc)").parameters == (group("?loc", "zone"),)
+    assert action(":parameters (?loc- zone ?b- - box)").parameters == (
+        group("?loc", "zone"),
+        group("?b-", "box"),
+    )
+    assert action(":parameters (?a- ?-b -zone ?c-)").parameters == (group("?a- ?-b", "zone"), group("?c-"))
+    assert action(":parameters (?a --zone ?b - -zone)").parameters == (
+        group("?a", "-zone"),
+        group("?b", "-zone"),
+    )
     kept = (group("?from-floor", "floor"),)
     assert action(":parameters (?from-floor - floor) :effect (at ?from-floor)").parameters == kept
     assert action(":parameters (?from-floor - floor)").parameters == kept

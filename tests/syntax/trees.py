@@ -30,9 +30,9 @@ _ODD = [
     "unknown",
 ]
 _RESERVED = {*FORM_WORDS, "invariant"}
-WORDS = st.one_of(
-    st.sampled_from(_ODD), st.from_regex(r"\A[A-Za-z_][A-Za-z0-9_.*+@#$%!~-]{0,8}[A-Za-z0-9_]\Z")
-).filter(lambda word: word.lower() not in _RESERVED)
+WORDS = st.one_of(st.sampled_from(_ODD), st.from_regex(r"\A[A-Za-z0-9_.*+@#$%!~-]{1,9}\Z")).filter(
+    lambda word: word.lower() not in _RESERVED and word not in {"-", "*", "+"}
+)
 names = WORDS.map(lambda text: ast.Name(text, S))
 _template_names = names.filter(lambda name: name.key not in BODY_WORDS)
 # An object in an equation must not look like a number.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
 
 import pytest
 
@@ -25,12 +26,17 @@ from tests.verify.test_storm import ask, ask_about_jani
 HALF = Fraction(1, 2)
 
 # The words of the languages of PRISM and Storm: model types, sections, functions, operators, properties.
-WORDS = """A E F G P R S U W X C I T H L M LRA MP Pmax Pmin Rmax Rmin Tmax Tmin
-    bool ceil clock const cos ctmc ctmdp double dtmc endinit endinvariant endmodule endobservables endplayer
-    endrewards endsystem exp exists false filter floor forall formula func global idtmc imdp init int invariant
-    iff implies label lts log ma max mdp min mod module multi nondeterministic not and or observable observables
-    of player pomdp popta pow prob probabilistic pta quantile rate rewards round sin smg state stochastic system
-    tan true xor""".split()
+WORDS = [
+    "A", "E", "F", "G", "P", "R", "S", "U", "W", "X", "C", "I", "T", "H", "L", "M", "LRA", "MP",
+    "Pmax", "Pmin", "Rmax", "Rmin", "Tmax", "Tmin", "bool", "ceil", "clock", "const", "cos",
+    "ctmc", "ctmdp", "double", "dtmc", "endinit", "endinvariant", "endmodule", "endobservables",
+    "endplayer", "endrewards", "endsystem", "exp", "exists", "false", "filter", "floor",
+    "forall", "formula", "func", "global", "idtmc", "imdp", "init", "int", "invariant", "iff",
+    "implies", "label", "lts", "log", "ma", "max", "mdp", "min", "mod", "module", "multi",
+    "nondeterministic", "not", "and", "or", "observable", "observables", "of", "player",
+    "pomdp", "popta", "pow", "prob", "probabilistic", "pta", "quantile", "rate", "rewards",
+    "round", "sin", "smg", "state", "stochastic", "system", "tan", "true", "xor",
+]  # fmt: skip
 
 
 def spellings() -> list[str]:
@@ -46,7 +52,7 @@ def corridor(names: list[str]) -> Task:
     variables = tuple(sorted((Variable(name, (), False) for name in names), key=lambda v: v.name))
     index = {variable.predicate: number for number, variable in enumerate(variables)}
     actions = []
-    for here, there in zip(names, names[1:], strict=False):
+    for here, there in pairwise(names):
         sets = Effect(None, ((index[here], Truth.FALSE), (index[there], Truth.TRUE)))
         fails = Effect(None, ((index[here], Truth.FALSE),))
         certain = (Outcome(Fraction(1), (sets,)),)
