@@ -30,6 +30,7 @@ from bbtc.manifest.find import manifest_bytes, source_name
 
 if TYPE_CHECKING:
     from bbtc.build.job import Failure, Job, Made
+    from bbtc.export.begun import Place
     from bbtc.manifest.read import Manifest, TreeEntry
 
 _SAVE_EVERY = 1.0
@@ -223,27 +224,49 @@ class _Builder:
     def _settle(self, entry: TreeEntry, made: Made) -> Outcome:
         """Write what was made, take note of it, and tell what became of the tree."""
         from bbtc.build.job import TREE
+        from bbtc.export.begun import Place
 
         diagnostics = [*made.diagnostics, *complaints(entry, made)]
         if made.failure is not None:
             return Outcome(entry.name, "failed", (), tuple(diagnostics), made.failure)
         changed: list[str] = []
+        failed = False
         for files in made.steps.values():
             for path, data in files.items():
                 try:
-                    changed.extend([path] if self._write(path, data) else [])
+                    place = self._place(path, data) if path in made.begun else Place(path)
+                    diagnostics.extend([place.warning] if place.warning is not None else [])
+                    if place.path is not None and self._write(place.path, data):
+                        changed.append(place.path)
                 except BbtcError as error:
                     diagnostics.extend(error.diagnostics)
-        if len(diagnostics) > len(made.diagnostics):
+                    failed = True
+        if failed:
             return Outcome(entry.name, "failed", tuple(changed), tuple(diagnostics), "error")
         done = self.fresh[entry.name]
         for name, files in made.steps.items():
             inputs = entry.inputs if name == TREE else (entry.file,)
             known = {path: self.contents.digest(path) or "" for path in inputs}
-            outputs = {path: self.contents.wrote(path, data) for path, data in files.items()}
+            outputs = {
+                path: (path in made.begun and self.contents.digest(path)) or self.contents.wrote(path, data)
+                for path, data in files.items()
+            }
             done[name] = replace(self.plans[entry.name][name], inputs=known, outputs=outputs)
         self.state.trees[entry.name] = done
         return Outcome(entry.name, "built", tuple(changed), tuple(diagnostics), summary=made.summary)
+
+    def _place(self, path: str, data: bytes) -> Place:
+        """Where a text goes that begins a file: not over the file that somebody has filled in."""
+        from bbtc.export.begun import Place, place_of
+
+        shown = source_name(self.folder, path)
+        try:
+            old = self.contents.read(path)
+        except FileNotFoundError:
+            return Place(path)
+        except OSError as error:
+            raise BbtcError.single("BBT0004", f"cannot read {shown}: {error.strerror}") from error
+        return place_of(path, old, data, shown=shown, check=self.check)
 
     def _write(self, path: str, data: bytes) -> bool:
         whole = self.folder / path

@@ -5,23 +5,26 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar, cast
 
 import click
 
 from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine
 from bbtc.cli.rendering import render
-from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
+from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report, Severity
 from bbtc.files import require_writable, write, write_depfile, write_files
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 
 if TYPE_CHECKING:
     from bbtc.export.registry import Artefact
+
+_Text = TypeVar("_Text", str, bytes, str | bytes)
 
 
 @dataclass(slots=True)
@@ -70,11 +73,42 @@ class Session:
         """Write what a command made, as ``-o``, ``--check`` and ``--depfile`` ask."""
         self.clear()
         if isinstance(artefact, str | bytes):
-            write(output, artefact, check=check)
+            for path, text in self._places({output: artefact}, "", check=check).items():
+                write(path, text, check=check)
         else:
-            write_files(output, artefact.texts, check=check)
+            write_files(output, self._places(artefact.texts, output, check=check), check=check)
         if depfile is not None:
             write_depfile(depfile, output, self.inputs)
+
+    def _places(self, texts: Mapping[str, _Text], folder: str, *, check: bool) -> dict[str, _Text]:
+        """The texts by where they go: not over what was begun here before, which is somebody's by now."""
+        from bbtc.export.registry import Begun
+
+        found: dict[str, _Text] = {}
+        kept: list[str] = []
+        for name, text in texts.items():
+            path = Path(folder, name)
+            if not isinstance(text, Begun) or name == "-" or not path.is_file():
+                found[name] = text
+                continue
+            from bbtc.export.begun import place_of
+
+            try:
+                old = path.read_bytes()
+            except OSError as error:
+                raise BbtcError.single("BBT0004", f"cannot read {path}: {error.strerror}") from error
+            place = place_of(name, old, text.encode(), shown=str(path), check=check)
+            if place.path is not None:
+                found[place.path] = text
+            if place.warning is not None:
+                self.report.add(place.warning)
+            elif place.path is None:
+                kept.append(str(path))
+        if kept and not check:
+            message = f"{', '.join(kept)}: yours, and left as it is"
+            hint = "to begin it anew, delete it, or write to another place"
+            self.report.add(Diagnostic("BBT1011", message, hint=hint, severity=Severity.NOTE))
+        return found
 
     def show(self, diagnostics: Sequence[Diagnostic]) -> None:
         """Write diagnostics to stderr in the session's form (the machine forms even if empty)."""

@@ -13,6 +13,7 @@ from bbtc.artefacts.cursor import At, Fault, Faults, clip, legible, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.diagnostics import BbtcError
 from bbtc.export.registry import Exporter, load_exporter, parse_options
+from bbtc.manifest import modules
 from bbtc.manifest.expectations import Expectation, parse_expectation
 from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
 from bbtc.plan.options import Retries
@@ -103,6 +104,7 @@ class _Reader:
     faults: Faults
     output: str = DEFAULT_OUTPUT
     owners: dict[str, str] = field(default_factory=dict)
+    folders: dict[str, str] = field(default_factory=dict)
     exporters: dict[str, Exporter] = field(default_factory=dict)
 
     def manifest(self, at: At, file: Path) -> Manifest:
@@ -181,16 +183,27 @@ class _Reader:
             named = [(_text(each), At(None, each.path)) for each in _few(at.elements(), at)]
         else:
             named = _few(list(at.entries()), at)
+        forms = [_form(name, each) for name, each in named]
         exports = []
         for name, each in named:
             try:
-                exports.append(self._export(name, each, tree))
+                exports.append(self._export(name, each, tree, forms))
             except Fault as fault:
                 self.faults.add(fault)
-        return tuple(exports)
+        places = dict(named)
+        return tuple(self._with_module(places[export.name], export, exports) for export in exports)
 
-    def _export(self, name: str, at: At, tree: str) -> Export:
-        """One export: nothing, the file, or a mapping."""
+    def _with_module(self, at: At, export: Export, exports: list[Export]) -> Export:
+        """The export, if it is a robot, with the module of its tree."""
+        try:
+            return modules.with_module(export, exports) if export.form == modules.ROBOT else export
+        except ValueError as error:
+            hint = "name its file otherwise, or say `options: {module: …}`"
+            self.faults.add(at.fault("BBT0707", legible(str(error)), hint))
+            return export
+
+    def _export(self, name: str, at: At, tree: str, forms: list[str]) -> Export:
+        """One export: nothing, the file, or a mapping. ``forms`` are the formats of all."""
         members: dict[str, At] = {}
         if isinstance(at.value, str):
             members = {"file": at}
@@ -207,8 +220,9 @@ class _Reader:
             part = f"-{name}" if form != name else ""
             if not _NAME.fullmatch(name) or ".." in name or "/" in name:
                 raise at.fault("BBT0604", f"'{clip(name)}' cannot name an export: give its file")
+            own = modules.default_file(form, tree, forms) if form == name else None
             # A format of several files goes into a folder of its own.
-            file = f"{self.output}/{tree}{part}{exporter.suffix or f'-{form}'}"
+            file = f"{self.output}/{own or f'{tree}{part}' + (exporter.suffix or f'-{form}')}"
         self._claim(at, file, f"{tree}, {name}")
         span = self.marked.span(at.path)
         return Export(name, form, file, options, not exporter.suffix, span)
@@ -225,10 +239,28 @@ class _Reader:
         return tuple(sorted(texts.items()))
 
     def _claim(self, at: At, file: str, owner: str) -> None:
-        """Every file is made once."""
-        other = self.owners.setdefault(file, owner)
-        if other != owner:
-            self.faults.add(at.fault("BBT1003", f"{file} is made twice: for '{other}' and for '{owner}'"))
+        """Every file is made once, and none where another one needs a folder."""
+        above = [str(folder) for folder in PurePosixPath(file).parents][:-1]
+        twice = self.owners.get(file)
+        around = next((folder for folder in above if folder in self.owners), None)
+        if twice is not None:
+            message = f"{file} is made twice: for '{twice}' and for '{owner}'"
+        elif around is not None:
+            message = f"{file}, for '{owner}', is inside {around}, which is made for '{self.owners[around]}'"
+        elif file in self.folders:
+            inside = self.folders[file]
+            message = f"{file}, for '{owner}', is around {inside}, which is made for '{self.owners[inside]}'"
+        else:
+            self.owners[file] = owner
+            self.folders.update((folder, file) for folder in above if folder not in self.folders)
+            return
+        self.faults.add(at.fault("BBT1003", message))
+
+
+def _form(name: str, at: At) -> str:
+    """The format of an export, as far as it can be told before it is read."""
+    given = at.value.get("format", name) if isinstance(at.value, dict) else name
+    return str(given)
 
 
 # --- single values ---------------------------------------------------------------------------

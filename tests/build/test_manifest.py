@@ -321,3 +321,24 @@ def test_the_schema_knows_every_figure_and_setting() -> None:
 def test_the_schema_knows_every_strategy() -> None:
     strategy = SCHEMA["$defs"]["strategy"]
     assert (set(strategy["enum"]), strategy["default"]) == (set(STRATEGIES), DEFAULT)
+
+
+@pytest.mark.parametrize(
+    ("trees", "message"),
+    [
+        ("a: {domain: d, exports: [dot, dot]}", "build/a.dot is made twice"),
+        ("a: {domain: d, exports: {dot: x/./y, svg: x//y}}", "x/y is made twice"),
+        ("a: {domain: d, exports: {dot: x/y}}, b: {domain: d, exports: {dot: ./x/y}}", "x/y is made twice"),
+        ("a: {domain: d, tree: x}, b: {domain: d, exports: {svg: x/y}}", "x/y, for 'b, svg', is inside x"),
+        ("a: {domain: d, exports: {svg: x/y/z}}, b: {domain: d, tree: x}", "x, for 'b', is around x/y/z"),
+        ("a: {domain: d, exports: {btcpp_project: p, btcpp: p/tree.xml}}", "is inside p"),
+        ("a: {domain: d, exports: {btcpp: p/tree.xml, btcpp_project: p}}", "is around p/tree.xml"),
+        ("a: {domain: d, exports: {btcpp_project: p, q: {format: btcpp_project, file: p/q}}}", "is inside p"),
+        ("a-b: {domain: d, exports: [py_trees_robot]}, a_b: {domain: d, exports: [py_trees_robot]}",
+         "build/a_b_robot.py is made twice"),
+    ],
+)  # fmt: skip
+def test_exports_that_would_write_over_each_other_are_refused(trees: str, message: str) -> None:
+    (fault,) = faults(f"trees: {{{trees}}}\n")
+    assert fault[0] == "BBT1003"
+    assert message in fault[2]
