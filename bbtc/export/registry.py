@@ -47,7 +47,8 @@ class Files:
 
 
 Artefact: TypeAlias = str | bytes | Files
-"""What an exporter makes: text, bytes for a binary format, or files for a directory."""
+"""What an exporter makes: text (:class:`Begun` where people fill it in), bytes for a binary format, or files
+for a directory."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from typing import TypeVar
 from bbtc.artefacts.cursor import At, Fault, Faults, clip, legible, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.diagnostics import BbtcError
+from bbtc.export.begun import BESIDE
 from bbtc.export.registry import Exporter, load_exporter, parse_options
 from bbtc.manifest import modules
 from bbtc.manifest.expectations import Expectation, parse_expectation
@@ -242,9 +243,15 @@ class _Reader:
         """Every file is made once, and none where another one needs a folder."""
         above = [str(folder) for folder in PurePosixPath(file).parents][:-1]
         twice = self.owners.get(file)
+        # Beside a file that people fill in, its name with this ending is for how it would begin now.
+        kept = next(
+            (each for each in (file.removesuffix(BESIDE), file + BESIDE) if each in self.owners), None
+        )
         around = next((folder for folder in above if folder in self.owners), None)
         if twice is not None:
             message = f"{file} is made twice: for '{twice}' and for '{owner}'"
+        elif kept is not None:
+            message = f"{file}, for '{owner}', and {kept}, for '{self.owners[kept]}', differ by {BESIDE} only"
         elif around is not None:
             message = f"{file}, for '{owner}', is inside {around}, which is made for '{self.owners[around]}'"
         elif file in self.folders:

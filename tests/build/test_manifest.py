@@ -334,6 +334,8 @@ def test_the_schema_knows_every_strategy() -> None:
         ("a: {domain: d, exports: {btcpp_project: p, btcpp: p/tree.xml}}", "is inside p"),
         ("a: {domain: d, exports: {btcpp: p/tree.xml, btcpp_project: p}}", "is around p/tree.xml"),
         ("a: {domain: d, exports: {btcpp_project: p, q: {format: btcpp_project, file: p/q}}}", "is inside p"),
+        ("a: {domain: d, exports: {py_trees_robot: r.py, dot: r.py.new}}", "r.py.new, for 'a, dot', and"),
+        ("a: {domain: d, exports: {dot: r.py.new, py_trees_robot: r.py}}", "differ by .new only"),
         ("a-b: {domain: d, exports: [py_trees_robot]}, a_b: {domain: d, exports: [py_trees_robot]}",
          "build/a_b_robot.py is made twice"),
     ],
