@@ -118,6 +118,7 @@ CODES: dict[str, str] = {
     "BBT0704": "wrong export option",
     "BBT0705": "tree too deep for the engine",
     "BBT0706": "no program can draw the picture",
+    "BBT0707": "module that Python cannot import",
     # 08xx: verification
     "BBT0801": "tree whose figures are not what it claims",
     "BBT0802": "tree that is not sound",
@@ -133,4 +134,6 @@ CODES: dict[str, str] = {
     "BBT1007": "file in the way of a new project",
     "BBT1008": "link in the way of a build",
     "BBT1009": "artefact in the place of a source",
+    "BBT1011": "file that is yours is left as it is",
+    "BBT1012": "file that is yours does not fit the tree",
 }

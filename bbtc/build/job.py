@@ -10,7 +10,7 @@ from bbtc import pipeline
 from bbtc.artefacts import dumps, load_tree, tree_to_json
 from bbtc.artefacts.numbers import exact
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
-from bbtc.export.registry import Files
+from bbtc.export.registry import Begun, Files
 from bbtc.files import system_trouble
 from bbtc.limits import Limits
 from bbtc.manifest.read import Export, TreeEntry
@@ -45,7 +45,8 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Made:
-    """What came of a job: by step, the content of the files, by path. ``unmet`` tells, by number, which
+    """What came of a job: by step, the content of the files, by path; ``begun`` are those that people fill in
+    (:class:`bbtc.export.registry.Begun`). ``unmet`` tells, by number, which
     expectations are not met, and what is the case; ``short`` why the target is not reached."""
 
     name: str
@@ -55,6 +56,7 @@ class Made:
     unmet: tuple[tuple[int, str], ...] = ()
     failure: Failure | None = None
     summary: str | None = None
+    begun: frozenset[str] = frozenset()
 
 
 def perform(job: Job) -> Made:
@@ -105,9 +107,12 @@ def _perform(job: Job, report: Report) -> Made:
         steps[FIGURES] = {}
     if unmet:
         return Made(entry.name, {}, tuple(report), unmet=tuple(unmet), failure="error")
+    begun: set[str] = set()
     for export in job.exports:
-        steps[export_step(export.name)] = _export(tree, export, limits)
-    return Made(entry.name, steps, tuple(report), summary=_summary(tree))
+        files = _export(tree, export, limits)
+        begun |= {path for path, text in files.items() if isinstance(text, Begun)}
+        steps[export_step(export.name)] = {path: _bytes(text) for path, text in files.items()}
+    return Made(entry.name, steps, tuple(report), summary=_summary(tree), begun=frozenset(begun))
 
 
 def _plan(job: Job, report: Report, limits: Limits) -> Plan:
@@ -121,11 +126,15 @@ def _plan(job: Job, report: Report, limits: Limits) -> Plan:
     return plan
 
 
-def _export(tree: Tree, export: Export, limits: Limits) -> dict[str, bytes]:
+def _export(tree: Tree, export: Export, limits: Limits) -> dict[str, str | bytes]:
     made = pipeline.export_tree(tree, export.form, dict(export.options), limits)
     if isinstance(made, Files):
-        return {f"{export.file}/{name}": text.encode() for name, text in made.texts.items()}
-    return {export.file: made.encode() if isinstance(made, str) else made}
+        return {f"{export.file}/{name}": text for name, text in made.texts.items()}
+    return {export.file: made}
+
+
+def _bytes(text: str | bytes) -> bytes:
+    return text.encode() if isinstance(text, str) else text
 
 
 def _summary(tree: Tree) -> str:

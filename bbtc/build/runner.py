@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -236,17 +236,43 @@ class _Builder:
         everything = {path: data for files in made.steps.values() for path, data in files.items()}
         changed: list[str] = []
         try:
-            changed = self._compare(everything) if self.held is None else self._write(self.held, everything)
+            wanted = self._wanted(everything, made.begun, diagnostics)
+            changed = self._compare(wanted) if self.held is None else self._write(self.held, wanted)
         except BbtcError as error:
             return Outcome(entry.name, "failed", (), (*diagnostics, *error.diagnostics), "error")
         done = self.fresh[entry.name]
         for name, files in made.steps.items():
             inputs = entry.inputs if name == TREE else (entry.file,)
             known = {path: self.contents.digest(path) or "" for path in inputs}
-            outputs = {path: self.contents.wrote(path, data) for path, data in files.items()}
+            outputs = {
+                path: (path in made.begun and self.contents.digest(path)) or self.contents.wrote(path, data)
+                for path, data in files.items()
+            }
             done[name] = replace(self.plans[entry.name][name], inputs=known, outputs=outputs)
         self.state.trees[entry.name] = done
         return Outcome(entry.name, "built", tuple(changed), tuple(diagnostics), summary=made.summary)
+
+    def _wanted(
+        self, files: Mapping[str, bytes], begun: Collection[str], diagnostics: list[Diagnostic]
+    ) -> dict[str, bytes]:
+        """What is to be written where: a text that begins a file does not go over one that somebody has
+        filled in. Warnings go to ``diagnostics``; raises :class:`BbtcError` for what cannot be read."""
+        from bbtc.export.begun import place_of
+
+        found = {}
+        for path, data in files.items():
+            shown = source_name(self.folder, path)
+            try:
+                old = self.contents.read(path) if path in begun else None
+            except FileNotFoundError:
+                old = None
+            except OSError as error:
+                raise BbtcError.single("BBT0004", f"cannot read {shown}: {error.strerror}") from error
+            place = place_of(path, old, data, shown=shown, check=self.held is None)
+            diagnostics.extend([place.warning] if place.warning is not None else [])
+            if place.path is not None:
+                found[place.path] = data
+        return found
 
     def _compare(self, files: Mapping[str, bytes]) -> list[str]:
         """Raise :class:`BbtcError` with every difference between files and what would be written."""

@@ -5,24 +5,27 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar, cast
 
 import click
 
 from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine, on_terminal, tell
 from bbtc.cli.rendering import render
-from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
-from bbtc.files import Outputs, require_apart, require_writable
+from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report, Severity
+from bbtc.files import Outputs, read_file, require_apart, require_writable
 from bbtc.limits import Limits
 from bbtc.printable import printable
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
 
 if TYPE_CHECKING:
     from bbtc.export.registry import Artefact
+
+_Text = TypeVar("_Text", str, bytes, str | bytes)
 
 
 @dataclass(slots=True)
@@ -89,14 +92,45 @@ class Session:
         self.clear()
         outputs = Outputs(check)
         if isinstance(artefact, str | bytes):
-            outputs.add(output, artefact)
+            for path, text in self._places({output: artefact}, "", check=check).items():
+                outputs.add(path, text)
         else:
-            outputs.add_files(output, artefact.texts)
+            outputs.add_files(output, self._places(artefact.texts, output, check=check))
         if not check:
             if depfile is not None:
                 outputs.add(depfile, _rule(output, self.inputs))
             require_apart(outputs.paths, self.inputs)
         outputs.write()
+
+    def _places(self, texts: Mapping[str, _Text], folder: str, *, check: bool) -> dict[str, _Text]:
+        """The texts by where they go: not over what was begun here before, which is somebody's by now."""
+        from bbtc.export.registry import Begun
+
+        found: dict[str, _Text] = {}
+        kept: list[str] = []
+        for name, text in texts.items():
+            path = Path(folder, name)
+            if not isinstance(text, Begun) or name == "-" or not path.is_file():
+                found[name] = text
+                continue
+            from bbtc.export.begun import place_of
+
+            try:
+                old = read_file(path, self.limits.file_bytes)
+            except OSError as error:
+                raise BbtcError.single("BBT0004", f"cannot read {path}: {error.strerror}") from error
+            place = place_of(name, old, text.encode(), shown=str(path), check=check)
+            if place.path is not None:
+                found[place.path] = text
+            if place.warning is not None:
+                self.report.add(place.warning)
+            elif place.path is None:
+                kept.append(str(path))
+        if kept and not check:
+            message = f"{', '.join(kept)}: yours, and left as it is"
+            hint = "to begin it anew, delete it, or write to another place"
+            self.report.add(Diagnostic("BBT1011", message, hint=hint, severity=Severity.NOTE))
+        return found
 
     def show(self, diagnostics: Sequence[Diagnostic]) -> None:
         """Write diagnostics to stderr in the session's form (the machine forms even if empty)."""

@@ -35,18 +35,25 @@ ACCESS = """\
 /// The id of the tree to run.
 inline constexpr const char* kMainTree = MAIN_TREE;
 
-/// Tick a tree until it ends, with a pause between ticks. SIGINT (Ctrl-C) and SIGTERM end that, too: the
-/// action that runs is cancelled, and the status is RUNNING.
-inline BT::NodeStatus run(BT::Tree& tree, std::chrono::milliseconds pause) {
+/// Tick a tree until it ends, with a pause between ticks. `ready` is asked before each tick; where it says
+/// no, the tick is left out. SIGINT (Ctrl-C) and SIGTERM end that, too: the action that runs is cancelled,
+/// and the status is RUNNING.
+inline BT::NodeStatus run(BT::Tree& tree, std::chrono::milliseconds pause,
+                          const std::function<bool()>& ready = [] { return true; }) {
   static volatile std::sig_atomic_t interrupted = 0;
   interrupted = 0;
   const auto interrupt = [](int) { interrupted = 1; };
   const auto on_interrupt = std::signal(SIGINT, interrupt);
   const auto on_terminate = std::signal(SIGTERM, interrupt);
-  BT::NodeStatus status = tree.tickOnce();
-  while (status == BT::NodeStatus::RUNNING && interrupted == 0) {
+  BT::NodeStatus status = BT::NodeStatus::RUNNING;
+  while (interrupted == 0) {
+    if (ready()) {
+      status = tree.tickOnce();
+    }
+    if (status != BT::NodeStatus::RUNNING) {
+      break;
+    }
     tree.sleep(pause);
-    status = interrupted == 0 ? tree.tickOnce() : status;
   }
   if (status == BT::NodeStatus::RUNNING) {
     tree.haltTree();
@@ -74,6 +81,7 @@ _LEAVES = (
 
 #include <chrono>
 #include <csignal>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -101,6 +109,8 @@ _STUB = """\
 
 #include <iostream>
 #include <optional>
+#include <set>
+#include <sstream>
 #include <string>
 
 #include "robot.hpp"
@@ -110,6 +120,22 @@ namespace ROBOT_TREE {
 class MyRobot : public Robot {
  public:
   MyRobot() = default;
+"""
+
+_STUB_END = """
+ private:
+  /// Tells, once, of a condition that is to be written.
+  template <typename... Words>
+  void toDo(const Words&... words) {
+    std::ostringstream told;
+    (told << ... << words);
+    if (told_.insert(told.str()).second) {
+      std::cerr << "to do: " << told.str() << '\\n';
+    }
+  }
+
+  std::set<std::string> told_;
+};
 """
 
 _CONDITION = """\
@@ -244,11 +270,15 @@ class LeafWriter:
                 body = [f"std::cerr << {' << '.join(words)} << '\\n';", "return BT::NodeStatus::FAILURE;"]
                 declared = self.declaration(leaf, self.method(leaf))
             else:
-                answer = "std::nullopt" if leaf.three_valued else "false"
-                body = [f"return {answer};  // to be written"]
-                declared = self.declaration(leaf, self.method(leaf), named=False)
+                # Else a tree whose guards it blocks would end without a word.
+                said, answer = ("unknown", "std::nullopt") if leaf.three_valued else ("false", "false")
+                words = [cppcode.literal(self.method(leaf))]
+                words += (f"' ', {parameter}" for parameter in cppcode.parameters(leaf.parameters))
+                words.append(cppcode.literal(f", {said} until then"))
+                body = [f"toDo({', '.join(words)});", f"return {answer};"]
+                declared = self.declaration(leaf, self.method(leaf))
             lines += ["", f"  {declared} override {{", *(f"    {line}" for line in body), "  }"]
-        return "\n".join([*lines, "};", "", *self._close()])
+        return "\n".join([*lines, _STUB_END, *self._close()])
 
     def _class(self, leaf: Leaf) -> str:
         ports = [

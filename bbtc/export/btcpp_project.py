@@ -97,6 +97,7 @@ set(CMAKE_CXX_STANDARD 17)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 
+find_package(Threads REQUIRED)  # a static library of BehaviorTree.CPP does not look for it
 find_package(behaviortree_cpp REQUIRED)
 set(engine BT::behaviortree_cpp)
 if(NOT TARGET ${engine})  # as ROS 2 builds it
@@ -109,6 +110,12 @@ foreach(program main simulate)
   target_link_libraries(${program} ${engine})
   target_compile_definitions(${program} PRIVATE TREE_FILE="${CMAKE_CURRENT_SOURCE_DIR}/tree.xml")
 endforeach()
+
+# Where my_robot.hpp comes or goes, main is compiled anew: no file that it includes would tell.
+file(GLOB my_robot CONFIGURE_DEPENDS my_robot.hpp)
+if(my_robot)
+  target_compile_definitions(main PRIVATE HAS_MY_ROBOT)
+endif()
 """
 
 _CMAKE_PLUGIN = """

@@ -12,6 +12,7 @@ from bbtc.export.btcpp_names import BtcppNames
 from bbtc.export.btcpp_palette import port_text, signature
 from bbtc.export.interface import Leaf
 from bbtc.export.names import Symbol
+from bbtc.export.registry import Begun
 from bbtc.ground.task import Task
 from bbtc.tree.nodes import Tree
 
@@ -26,9 +27,10 @@ def ros_files(tree: Tree, names: BtcppNames, program: Program, services: bool) -
         "leaves.hpp": writer.header(),
         "main.cpp": cppcode.fill(_MAIN, PACKAGE=program.package, ROBOT_TREE=program.space),
         "msg/Belief.msg": _BELIEF,
-        "msg/Beliefs.msg": "# What is known; facts that are missing are unknown.\nBelief[] beliefs\n",
+        "msg/Beliefs.msg": _BELIEFS,
     }
-    return files | writer.interfaces()
+    # To be adapted by their user: an export that comes later leaves them alone.
+    return {name: Begun(text) for name, text in (files | writer.interfaces()).items()}
 
 
 class _RosWriter:
@@ -102,7 +104,7 @@ class _RosWriter:
             PORTS=self._ports(leaf),
             FACT=cppcode.literal(self._names.ids[leaf.symbol]),
             ARGUMENTS=f"{{{', '.join(names)}}}",
-            UNKNOWN="BT::NodeStatus::RUNNING" if leaf.three_valued else "BT::NodeStatus::FAILURE",
+            UNKNOWN="true" if leaf.three_valued else "false",
         )
 
     def _action(self, leaf: Leaf) -> str:
@@ -129,21 +131,27 @@ class _RosWriter:
 
     def _register(self) -> str:
         lines = [
-            "/// Make a factory know every node of the tree, as clients of a ROS node.",
-            "inline void registerLeaves(BT::BehaviorTreeFactory& factory, BT::RosNodeParams params) {",
+            "/// Make a factory know every node of the tree, as clients of a ROS node. What its conditions",
+            "/// read is to be given to isReady before every tick.",
+            "inline std::shared_ptr<Beliefs> registerLeaves(BT::BehaviorTreeFactory& factory,",
+            "                                               BT::RosNodeParams params) {",
             *(["  bbtc::registerNodes(factory);"] if self._program.our_nodes else []),
-            '  params.default_port_value = "beliefs";',
+            "  // In later versions of behaviortree_ros2 the pointer is a weak one.",
+            "  auto beliefs = std::make_shared<Beliefs>(std::weak_ptr<rclcpp::Node>(params.nh).lock());",
         ]
-        lines += [self._registration(leaf.symbol, "Condition") for leaf in self._names.interface.conditions]
+        conditions = [leaf.symbol for leaf in self._names.interface.conditions]
+        lines += [self._registration(symbol, "Condition", "beliefs") for symbol in conditions]
         for leaf in self._names.interface.actions:
             server = cppcode.literal(_header_name(self._types[leaf.symbol]))
             lines.append(f"  params.default_port_value = {server};")
-            lines.append(self._registration(leaf.symbol, "Action"))
-        return "\n".join([*lines, "}", "", f"}}  // namespace {self._program.space}", ""])
+            lines.append(self._registration(leaf.symbol, "Action", "params"))
+        return "\n".join(
+            [*lines, "  return beliefs;", "}", "", f"}}  // namespace {self._program.space}", ""]
+        )
 
-    def _registration(self, symbol: Symbol, suffix: str) -> str:
+    def _registration(self, symbol: Symbol, suffix: str, given: str) -> str:
         name = f"{self._names.plain[symbol]}{suffix}"
-        return f"  factory.registerNodeType<{name}>({cppcode.literal(self._names.ids[symbol])}, params);"
+        return f"  factory.registerNodeType<{name}>({cppcode.literal(self._names.ids[symbol])}, {given});"
 
 
 def _header_name(interface: str) -> str:
@@ -162,6 +170,12 @@ string[] arguments
 uint8 value
 """
 
+_BELIEFS = """\
+# All that is known at a moment. Facts that are missing are unknown. Before its first tick, a tree waits for a
+# message that tells of every fact it reads, but for those that can be unknown.
+Belief[] beliefs
+"""
+
 _HEAD = (
     """\
 // The leaves of the tree as clients in ROS 2. Made by bbtc: a start, to be adapted to your interfaces.
@@ -169,13 +183,19 @@ _HEAD = (
 
 #include <chrono>
 #include <csignal>
+#include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <behaviortree_cpp/bt_factory.h>
+#include <behaviortree_cpp/condition_node.h>
 #include CLIENT
-#include <behaviortree_ros2/bt_topic_sub_node.hpp>
+#include <rclcpp/rclcpp.hpp>
 
 OURS
 INCLUDES
@@ -185,33 +205,132 @@ namespace ROBOT_TREE {
 """
     + ACCESS
     + """
-/// A condition reads the latest beliefs; it answers at once, with RUNNING where the fact is unknown.
-class BeliefCondition : public BT::RosTopicSubNode<PACKAGE::msg::Beliefs> {
- public:
-  using Beliefs = PACKAGE::msg::Beliefs;
-  using BT::RosTopicSubNode<PACKAGE::msg::Beliefs>::RosTopicSubNode;
+/// A fact: the id of its condition, and the values of its ports.
+struct Fact {
+  std::string condition;
+  std::vector<std::string> arguments;
+};
 
- protected:
-  BT::NodeStatus belief(const std::shared_ptr<Beliefs>& message, const std::string& condition,
-                        const std::vector<std::string>& arguments, BT::NodeStatus unknown) {
-    if (message) {
-      latest_ = message;
-    }
+/// What is known: the latest message on the topic `beliefs`. It changes in `update` only, between ticks.
+class Beliefs {
+ public:
+  using Message = PACKAGE::msg::Beliefs;
+  using Belief = PACKAGE::msg::Belief;
+
+  explicit Beliefs(const std::shared_ptr<rclcpp::Node>& node)
+      : logger_(node->get_logger()),
+        group_(node->create_callback_group(rclcpp::CallbackGroupType::MutuallyExclusive, false)) {
+    executor_.add_callback_group(group_, node->get_node_base_interface());
+    rclcpp::SubscriptionOptions options;
+    options.callback_group = group_;
+    subscription_ = node->create_subscription<Message>(
+        "beliefs", rclcpp::QoS(1),
+        [this](std::shared_ptr<const Message> message) { latest_ = std::move(message); }, options);
+  }
+
+  Beliefs(const Beliefs&) = delete;
+  Beliefs& operator=(const Beliefs&) = delete;
+
+  /// Take what has arrived.
+  void update() { executor_.spin_some(); }
+
+  /// Has there been any message?
+  bool any() const { return latest_ != nullptr; }
+
+  /// What the latest message says of a fact: one that it does not name is unknown.
+  std::uint8_t value(const Fact& fact) const {
     if (latest_) {
       for (const auto& one : latest_->beliefs) {
-        if (one.condition == condition && one.arguments == arguments) {
-          return one.value == one.TRUE    ? BT::NodeStatus::SUCCESS
-                 : one.value == one.FALSE ? BT::NodeStatus::FAILURE
-                                          : unknown;
+        if (one.condition == fact.condition && one.arguments == fact.arguments) {
+          return one.value;
         }
       }
     }
-    return unknown;
+    return Belief::UNKNOWN;
+  }
+
+  /// Say what a tree waits for: at once, and then every ten seconds.
+  void sayWaiting(const std::set<std::string>& facts) {
+    const auto now = std::chrono::steady_clock::now();
+    if (said_ && now - *said_ < std::chrono::seconds(10)) {
+      return;
+    }
+    said_ = now;
+    std::string text;
+    for (const auto& fact : facts) {
+      text += (text.empty() ? "" : ", ") + fact;
+    }
+    RCLCPP_WARN(logger_, "waiting for the topic beliefs to tell of %s", text.c_str());
   }
 
  private:
-  std::shared_ptr<Beliefs> latest_;
+  rclcpp::Logger logger_;
+  rclcpp::CallbackGroup::SharedPtr group_;
+  rclcpp::executors::SingleThreadedExecutor executor_;
+  rclcpp::Subscription<Message>::SharedPtr subscription_;
+  std::shared_ptr<const Message> latest_;
+  std::optional<std::chrono::steady_clock::time_point> said_;
 };
+
+/// A condition answers at once, with RUNNING where the fact is unknown. So it does where that is never so in
+/// the domain: nothing that needs it starts then.
+class BeliefCondition : public BT::ConditionNode {
+ public:
+  BeliefCondition(const std::string& name, const BT::NodeConfig& config, std::shared_ptr<Beliefs> beliefs)
+      : BT::ConditionNode(name, config), beliefs_(std::move(beliefs)) {}
+
+  /// The fact that it reads.
+  virtual Fact fact() const = 0;
+
+  /// Can it be unknown in the domain?
+  virtual bool canBeUnknown() const = 0;
+
+  /// Has a message told of it? That it is unknown is an answer where it can be.
+  bool isTold() const {
+    return beliefs_->any() && (canBeUnknown() || beliefs_->value(fact()) != Beliefs::Belief::UNKNOWN);
+  }
+
+ private:
+  BT::NodeStatus tick() override {
+    switch (beliefs_->value(fact())) {
+      case Beliefs::Belief::TRUE:
+        return BT::NodeStatus::SUCCESS;
+      case Beliefs::Belief::FALSE:
+        return BT::NodeStatus::FAILURE;
+      default:
+        return BT::NodeStatus::RUNNING;
+    }
+  }
+
+  std::shared_ptr<Beliefs> beliefs_;
+};
+
+/// Take what has arrived: to be called before every tick. Says whether the tree may be ticked: one that has
+/// not begun waits, however long, until every condition of it has been told.
+inline bool isReady(Beliefs& beliefs, const BT::Tree& tree) {
+  beliefs.update();
+  if (tree.rootNode()->status() != BT::NodeStatus::IDLE) {
+    return true;
+  }
+  std::set<std::string> missing;
+  for (const auto& subtree : tree.subtrees) {
+    for (const auto& node : subtree->nodes) {
+      const auto* condition = dynamic_cast<const BeliefCondition*>(node.get());
+      if (condition != nullptr && !condition->isTold()) {
+        const Fact fact = condition->fact();
+        std::string text = fact.condition + "(";
+        for (const auto& argument : fact.arguments) {
+          text += (&argument == fact.arguments.data() ? "" : ", ") + argument;
+        }
+        missing.insert(text + ")");
+      }
+    }
+  }
+  if (!missing.empty()) {
+    beliefs.sayWaiting(missing);
+  }
+  return missing.empty();
+}
 """
 )
 
@@ -221,11 +340,10 @@ class NAME : public BeliefCondition {
  public:
   using BeliefCondition::BeliefCondition;
 
-  static BT::PortsList providedPorts() { return providedBasicPorts(PORTS); }
+  static BT::PortsList providedPorts() { return PORTS; }
 
-  BT::NodeStatus onTick(const std::shared_ptr<Beliefs>& message) override {
-    return belief(message, FACT, ARGUMENTS, UNKNOWN);
-  }
+  Fact fact() const override { return {FACT, ARGUMENTS}; }
+  bool canBeUnknown() const override { return UNKNOWN; }
 };
 """
 
@@ -284,15 +402,17 @@ _MAIN = """\
 int main(int argc, char** argv) {
   // With the signal handlers of rclcpp, no goal could be cancelled any more after Ctrl-C.
   rclcpp::init(argc, argv, rclcpp::InitOptions(), rclcpp::SignalHandlerOptions::None);
+  const auto node = std::make_shared<rclcpp::Node>("PACKAGE");
   BT::RosNodeParams params;
-  params.nh = std::make_shared<rclcpp::Node>("PACKAGE");
+  params.nh = node;
   BT::BehaviorTreeFactory factory;
-  ROBOT_TREE::registerLeaves(factory, params);
+  const auto beliefs = ROBOT_TREE::registerLeaves(factory, params);
   factory.registerBehaviorTreeFromFile(TREE_FILE);
   // A tree runs once: its latches stay latched. Make a new one for another run.
   auto tree = factory.createTree(ROBOT_TREE::kMainTree);
-  const BT::NodeStatus status = ROBOT_TREE::run(tree, std::chrono::milliseconds(20));
-  RCLCPP_INFO(params.nh->get_logger(), "the tree returned %s", BT::toStr(status).c_str());
+  const auto ready = [&] { return ROBOT_TREE::isReady(*beliefs, tree); };
+  const BT::NodeStatus status = ROBOT_TREE::run(tree, std::chrono::milliseconds(20), ready);
+  RCLCPP_INFO(node->get_logger(), "the tree returned %s", BT::toStr(status).c_str());
   rclcpp::shutdown();
   return status == BT::NodeStatus::SUCCESS ? 0 : 1;
 }
@@ -357,4 +477,13 @@ ros2 run PACKAGE main
 
 It needs `behaviortree_ros2`. Write a server for each KIND here, and a node that publishes what is known on
 the topic `beliefs`, as `msg/Beliefs`: for each fact the id of its condition, its arguments, and its value.
+All facts stand in one message. Publish it again and again, since the tree may start later.
+
+Before its first tick the tree waits, however long, for a message that tells of every fact it reads, but for
+those that can be unknown; it says what it waits for. From then on a fact that the latest message does not
+name is unknown: its condition is RUNNING, and nothing that needs it starts.
+
+These files are yours, but for `tree.xml`, `palette.xml` and `bbtc_nodes*`: a later export leaves alone what
+you have changed. Where your `leaves.hpp` does not fit the tree any more, it says so, and writes
+`leaves.hpp.new` beside it.
 """

@@ -147,7 +147,7 @@ class SimulatedRobotWriter:
         key = f'std::string({name}) + {inner} + ")"' if names else name
         declared = self._leaves.declaration(leaf, self._leaves.method(leaf))
         if leaf.symbol.kind == "predicate":
-            value = f"world_.read({key})" if leaf.three_valued else f"world_.read({key}) == true"
+            value = f"world_.read({key})" if leaf.three_valued else f"world_.read({key}).value()"
             return f"\n  {declared} override {{ return {value}; }}"
         cancel = self._leaves.declaration(leaf, self._leaves.cancel(leaf))
         return (

@@ -26,10 +26,11 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Interface:
-    """The leaves a tree uses, sorted by name."""
+    """The leaves a tree uses, sorted by name; ``reads`` are the variables that conditions and guards read."""
 
     conditions: tuple[Leaf, ...]
     actions: tuple[Leaf, ...]
+    reads: tuple[int, ...] = ()
 
     @cached_property
     def leaves(self) -> dict[Symbol, Leaf]:
@@ -75,6 +76,7 @@ def interface_of(task: Task, root: Node) -> Interface:
     return Interface(
         tuple(Leaf(s, parameters_of(task, s), unknowable[s]) for s in sorted(unknowable)),
         tuple(Leaf(s, parameters_of(task, s)) for s in sorted(actions)),
+        tuple(sorted(read)),
     )
 
 

@@ -27,7 +27,7 @@ _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9]*(?:[-_][A-Za-z0-9]+)*")
 _SAFE_VALUE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 _WORDS = re.compile(r"[A-Za-z0-9]+")
 
-PYTHON_RESERVED = frozenset(keyword.kwlist) | {"self", "bool", "str", "cancel", "setup"}
+PYTHON_RESERVED = frozenset(keyword.kwlist) | {"self", "bool", "str", "cancel", "setup", "heard_of"}
 """Names that a method of a generated interface cannot have, whatever the letter case."""
 
 _ROS_PORTS = ("action_name", "service_name", "topic_name")  # ports that leaves of behaviortree_ros2 have

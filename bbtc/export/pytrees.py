@@ -13,12 +13,13 @@ from typing_extensions import assert_never
 
 from bbtc.export.interface import Interface, action_symbol, guard_of, interface_of, variable_symbol
 from bbtc.export.names import PYTHON_RESERVED, Symbol, identifiers
-from bbtc.export.pycode import Code, Group, Prefixed, call, layout, literal
+from bbtc.export.pycode import Code, Group, Prefixed, call, layout, literal, mapping
 from bbtc.export.pytrees_parts import (
+    CONDITION_TYPE,
     ConditionCode,
     action_summary,
     condition_summary,
-    condition_type,
+    fact_tuple,
     harmless,
     method,
 )
@@ -92,11 +93,12 @@ class _Writer:
 
     def module(self) -> str:
         """The source text."""
-        body = layout(call("StopWhenBlocked", "robot", self._code(self.root, 1)), "return ", level=1)
+        body = layout(call("StopWhenBlocked", "robot", self._code(self.root, 1), "READS"), "return ", level=1)
         root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *body]
-        trees, tables, main = [*self.branches, root], self.world.tables(), _MAIN.splitlines()
+        trees, main = [*self.branches, root], _MAIN.splitlines()
+        tables = [self._reads(), *self.world.tables()]
         # Without the methods of the robots, whose parameters may be named like anything.
-        used = {"Protocol", "Status", "World", "run"}
+        used = {"Fact", "Protocol", "Status", "World", "run"}
         used |= used_in(line for block in [*trees, *tables, main] for line in block)
         if self.embedded:
             used = needed(used)
@@ -126,10 +128,21 @@ class _Writer:
     def _protocol(self) -> list[str]:
         lines, methods = _PROTOCOL.splitlines(), self.names.methods
         for leaf in self.names.interface.conditions:
-            lines += method(methods[leaf.symbol], leaf, condition_type(leaf), condition_summary(leaf))
+            lines += method(methods[leaf.symbol], leaf, CONDITION_TYPE, condition_summary(leaf))
         for leaf in self.names.interface.actions:
             lines += method(methods[leaf.symbol], leaf, "Status", action_summary(leaf))
         return lines
+
+    def _reads(self) -> list[str]:
+        interface = self.names.interface
+        table = mapping(
+            (fact_tuple(variable), str(interface.leaves[variable_symbol(variable)].three_valued))
+            for variable in map(self.task.variables.__getitem__, interface.reads)
+        )
+        return [
+            *layout(table, "READS: dict[Fact, bool] = "),
+            '"""The facts that the tree reads, and whether they can be unknown."""',
+        ]
 
     # --- tree --------------------------------------------------------------------------------
 

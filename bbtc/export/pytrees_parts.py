@@ -9,6 +9,7 @@ from typing_extensions import assert_never
 from bbtc.export.interface import Leaf
 from bbtc.export.pycode import Code, call, flat, layout, literal
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.task import Variable
 from bbtc.kleene import Truth
 
 
@@ -53,25 +54,47 @@ def method(name: str, leaf: Leaf, result: str, *body: str) -> list[str]:
     return ["", *head, *(f"        {line}" for line in body)]
 
 
-def condition_type(leaf: Leaf) -> str:
-    """What the method of a condition returns."""
-    return "bool | None" if leaf.three_valued else "bool"
+CONDITION_TYPE = "bool | None"
+"""What the method of a condition returns, also where the domain leaves nothing unknown: a robot may know
+less, and then the tree starts nothing that needs to know."""
+
+
+_CONDITION, _ACTION, _UNKNOWN = "Whether ", "Start or continue ", "; None where that is unknown"
 
 
 def condition_summary(leaf: Leaf) -> str:
     """The docstring of the method of a condition."""
-    unknown = "; None where that is unknown" if leaf.three_valued else ""
-    return f'"""Whether {_signature(leaf)} holds{unknown}."""'
+    return f'"""{_CONDITION}{_signature(leaf)} holds{_UNKNOWN if leaf.three_valued else ""}."""'
 
 
 def action_summary(leaf: Leaf) -> str:
     """The docstring of the method of an action."""
-    return f'"""Start or continue {_signature(leaf)}."""'
+    return f'"""{_ACTION}{_signature(leaf)}."""'
+
+
+def is_summary(text: str) -> bool:
+    """Is this the docstring of a condition or an action?"""
+    return text.startswith((_CONDITION, _ACTION))
+
+
+def can_be_unknown(summary: str) -> bool:
+    """Is this the docstring of a condition that can be unknown?"""
+    return summary.startswith(_CONDITION) and summary.endswith(f"{_UNKNOWN}.")
 
 
 def fact_of(leaf: Leaf) -> list[str]:
     """The name of a leaf and its parameters, as arguments of a call."""
     return [literal(leaf.symbol.name), *leaf.parameters]
+
+
+def fact_tuple(variable: Variable) -> str:
+    """A fact as a tuple of its predicate and its arguments."""
+    return words_tuple((variable.predicate, *variable.args))
+
+
+def words_tuple(words: tuple[str, ...]) -> str:
+    """A tuple of texts."""
+    return f"({', '.join(map(literal, words))}{',' if len(words) == 1 else ''})"
 
 
 def _signature(leaf: Leaf) -> str:

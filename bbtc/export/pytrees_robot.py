@@ -16,15 +16,15 @@ from bbtc.export.names import PYTHON_RESERVED, module_name
 from bbtc.export.pycode import call, layout, literal
 from bbtc.export.pytrees import PyTreesNames, py_trees_names
 from bbtc.export.pytrees_parts import (
+    CONDITION_TYPE,
     action_summary,
     condition_summary,
-    condition_type,
     fact_of,
     harmless,
     method,
 )
 from bbtc.export.pytrees_runtime import RUNTIME, copied, import_from, imports, needed
-from bbtc.export.registry import Figures, Option, OptionValue
+from bbtc.export.registry import Begun, Figures, Option, OptionValue
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree
@@ -33,6 +33,11 @@ MODULE = Option("module", "", "the module that --to py_trees wrote; by default n
 NAMESPACE = Option("namespace", "", "of the blackboard's keys; by default /DOMAIN/PROBLEM")
 
 _MODULE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
+
+
+def is_module(name: str) -> bool:
+    """Can this be the name of a module that Python imports?"""
+    return _MODULE.fullmatch(name) is not None and not PYTHON_RESERVED & set(name.split("."))
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +49,13 @@ class PyTreesRobotExporter:
     suffix: str = ".py"
     options: tuple[Option, ...] = (MODULE, NAMESPACE, RUNTIME)
 
-    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> Begun:
         """The source text. Raises :class:`BbtcError` (BBT0704) for a module or a namespace that
         cannot be one."""
         del figures
         task = tree.task
         module = str(options[MODULE.name]) or module_name(task.problem)
-        if not _MODULE.fullmatch(module) or PYTHON_RESERVED & set(module.split(".")):
+        if not is_module(module):
             raise BbtcError.single(
                 "BBT0704",
                 f"option 'module' of format '{self.name}' must be a name of a Python module, not '{module}'",
@@ -58,7 +63,7 @@ class PyTreesRobotExporter:
         given = [word for word in str(options[NAMESPACE.name]).split("/") if word]
         embedded = options[RUNTIME.name] == "embedded"
         lines = _lines(task, py_trees_names(tree), module, given or [task.domain, task.problem], embedded)
-        return "\n".join(lines) + "\n"
+        return Begun("\n".join(lines) + "\n")
 
 
 py_trees_robot = PyTreesRobotExporter()
@@ -88,35 +93,34 @@ def _lines(
 def _class(task: Task, names: PyTreesNames, namespace: list[str]) -> Iterator[str]:
     yield from _HEAD.splitlines()
     yield from layout(call("Beliefs", *map(literal, namespace)), "self._beliefs = ", level=2)
-    known = list(_known_at_start(task, names.interface))
+    known = list(_believed_at_start(task, names.interface))
     if known:
         yield "        # What the problem says of the start:"
     for value, fact in known:
-        yield from layout(call("self._beliefs.believe", str(value), *map(literal, fact)), level=2)
+        yield from layout(call("self._beliefs.believe", value, *map(literal, fact)), level=2)
     yield from _SETUP.splitlines()
     for leaf in names.interface.conditions:
-        test = "" if leaf.three_valued else " is True"
-        reading = layout(call("self._beliefs.value", *fact_of(leaf)), "return ", test)
-        name, result = names.methods[leaf.symbol], condition_type(leaf)
-        yield from method(name, leaf, result, condition_summary(leaf), *reading)
+        reading = layout(call("self._beliefs.value", *fact_of(leaf)), "return ")
+        name = names.methods[leaf.symbol]
+        yield from method(name, leaf, CONDITION_TYPE, condition_summary(leaf), *reading)
     for leaf in names.interface.actions:
         failing = layout(call("self._to_do", *fact_of(leaf)), "return ")
         yield from method(names.methods[leaf.symbol], leaf, "Status", action_summary(leaf), *failing)
     yield from _TO_DO.splitlines()
 
 
-def _known_at_start(task: Task, interface: Interface) -> Iterator[tuple[bool, tuple[str, ...]]]:
-    """Facts that the tree reads and that are true, or false, in every initial state."""
+def _believed_at_start(task: Task, interface: Interface) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Facts that the tree may read, and what the problem says of them: the same in every initial state."""
+    words = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
     for index, variable in enumerate(task.variables):
         values = {state.values[index] for state in task.initial}
-        if variable_symbol(variable) in interface.leaves and len(values) == 1 and Truth.UNKNOWN not in values:
-            yield values == {Truth.TRUE}, (variable.predicate, *variable.args)
+        if variable_symbol(variable) in interface.leaves and len(values) == 1:
+            yield words[values.pop()], (variable.predicate, *variable.args)
 
 
 _USAGE = '''
-    python {file}_robot.py
-
-runs the tree. In ROS, give create_root(MyRobot()) to py_trees_ros.trees.BehaviourTree.
+As a program, this file runs the tree. In ROS, give create_root(MyRobot()) to
+py_trees_ros.trees.BehaviourTree.
 """
 '''
 
@@ -130,6 +134,10 @@ class MyRobot:
 _SETUP = '''
     def setup(self, **kwargs: Any) -> None:
         """Called once, before the first tick. In ROS, kwargs["node"] is the node."""
+
+    def heard_of(self, *fact: str, unknown: bool) -> bool:
+        """Whether anything is believed of a fact. The tree waits for that before its first tick."""
+        return self._beliefs.heard_of(*fact, unknown=unknown)
 
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
@@ -148,7 +156,10 @@ _MAIN = '''\
 def main() -> None:
     """Run the tree with this robot."""
     robot: Robot = MyRobot()
-    print(f"The tree returned {run(create_root(robot), period=0.1).value}.")
+    root = create_root(robot)
+    print(f"The tree returned {run(root, period=0.1).value}.")
+    if root.feedback_message:
+        print(root.feedback_message)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from fractions import Fraction
 from bbtc.export.interface import Interface
 from bbtc.export.names import Symbol
 from bbtc.export.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
-from bbtc.export.pytrees_parts import ConditionCode, condition_type, fact_of, method
+from bbtc.export.pytrees_parts import CONDITION_TYPE, ConditionCode, fact_of, fact_tuple, method, words_tuple
 from bbtc.export.world_model import actions_used, changes_of, initial_values, relevant_variables
 from bbtc.ground.task import Factor, Outcome, Task
 from bbtc.kleene import Truth
@@ -35,7 +35,8 @@ class WorldWriter:
         """``INITIAL`` and ``ACTIONS``."""
         initial = layout(self._initial(), "INITIAL: list[tuple[str, State]] = ")
         actions = mapping(
-            (_tuple((action.schema, *action.args)), self._factors(action.factors)) for action in self._actions
+            (words_tuple((action.schema, *action.args)), self._factors(action.factors))
+            for action in self._actions
         )
         return [
             [*initial, '"""The states a run may start in, with their probabilities."""'],
@@ -49,9 +50,8 @@ class WorldWriter:
         """The class ``SimulatedWorld``."""
         lines = ["class SimulatedWorld(World):", '    """Plays the robot."""']
         for leaf in self._interface.conditions:
-            value = flat(call("self._value", *fact_of(leaf)))
-            answer = value if leaf.three_valued else f"{value} is True"
-            lines += method(self._methods[leaf.symbol], leaf, condition_type(leaf), f"return {answer}")
+            answer = flat(call("self._value", *fact_of(leaf)))
+            lines += method(self._methods[leaf.symbol], leaf, CONDITION_TYPE, f"return {answer}")
         for leaf in self._interface.actions:
             answer = flat(call("self._act", *fact_of(leaf)))
             lines += method(self._methods[leaf.symbol], leaf, "Status", f"return {answer}")
@@ -68,8 +68,7 @@ class WorldWriter:
         return mapping((self._fact(index), _VALUES[value]) for index, value in assignment)
 
     def _fact(self, index: int) -> str:
-        variable = self._task.variables[index]
-        return _tuple((variable.predicate, *variable.args))
+        return fact_tuple(self._task.variables[index])
 
     def _factors(self, factors: tuple[Factor, ...]) -> Code:
         return sequence(sequence(map(self._outcome, factor.outcomes)) for factor in factors)
@@ -90,7 +89,3 @@ class WorldWriter:
 
 def _probability(value: Fraction) -> str:
     return literal(str(value))
-
-
-def _tuple(words: tuple[str, ...]) -> str:
-    return f"({', '.join(map(literal, words))}{',' if len(words) == 1 else ''})"

@@ -32,6 +32,13 @@ Figures: TypeAlias = Mapping[str, Fraction]
 """By node id: the probability that a tick reaches the node at least once in a run."""
 
 
+class Begun(str):
+    """A text to start from. Once it is written and filled in, the file is the user's: it is never written
+    over. It is an artefact, or one of those in :class:`Files`."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Files:
     """An artefact of several files, such as a project: relative paths with ``/`` and their texts,
@@ -41,7 +48,8 @@ class Files:
 
 
 Artefact: TypeAlias = str | bytes | Files
-"""What an exporter makes: text, bytes for a binary format, or files for a directory."""
+"""What an exporter makes: text (:class:`Begun` where people fill it in), bytes for a binary format, or files
+for a directory."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bbtc.artefacts.cursor import At, Fault
+from bbtc.export.begun import BESIDE
 from bbtc.files import KEPT, ignores_case
 from bbtc.manifest.find import TOML_NAME, YAML_NAME
 
@@ -63,6 +64,12 @@ class Places:
                 owners_of_it = f"'{other.owner}' and for '{claim.owner}'"
                 yield _twice(claim, f"{claim.file} is made twice: for {owners_of_it}")
         for parts, claim in owners.items():
+            # Beside a file that people fill in, its name with this ending is for how it would begin now.
+            beside = owners.get((*parts[:-1], parts[-1] + BESIDE))
+            if beside is not None:
+                yield _twice(
+                    beside, f"{beside.file} and {claim.file}, for '{claim.owner}', differ by {BESIDE} only"
+                )
             for length in range(1, len(parts)):
                 outer = owners.get(parts[:length])
                 if outer is not None:

@@ -13,6 +13,7 @@ from bbtc.artefacts.cursor import At, Fault, Faults, Stop, clip, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.diagnostics import BbtcError
 from bbtc.export.registry import Exporter, load_exporter, parse_options
+from bbtc.manifest import modules
 from bbtc.manifest.expectations import Expectation, parse_expectation
 from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
 from bbtc.manifest.places import Places
@@ -202,16 +203,27 @@ class _Reader:
             named = [(_text(each), At(None, each.path)) for each in self._few(at.elements(), at)]
         else:
             named = self._few(list(at.entries()), at)
+        forms = [_form(name, each) for name, each in named]
         exports = []
         for name, each in named:
             try:
-                exports.append(self._export(name, each, tree))
+                exports.append(self._export(name, each, tree, forms))
             except Fault as fault:
                 self.faults.add(fault)
-        return tuple(exports)
+        places = dict(named)
+        return tuple(self._with_module(places[export.name], export, exports) for export in exports)
 
-    def _export(self, name: str, at: At, tree: str) -> Export:
-        """One export: nothing, the file, or a mapping."""
+    def _with_module(self, at: At, export: Export, exports: list[Export]) -> Export:
+        """The export, if it is a robot, with the module of its tree."""
+        try:
+            return modules.with_module(export, exports) if export.form == modules.ROBOT else export
+        except ValueError as error:
+            hint = "name its file otherwise, or say `options: {module: …}`"
+            self.faults.add(at.fault("BBT0707", printable(str(error)), hint))
+            return export
+
+    def _export(self, name: str, at: At, tree: str, forms: list[str]) -> Export:
+        """One export: nothing, the file, or a mapping. ``forms`` are the formats of all."""
         members: dict[str, At] = {}
         if isinstance(at.value, str):
             members = {"file": at}
@@ -228,8 +240,9 @@ class _Reader:
             part = f"-{name}" if form != name else ""
             if not _NAME.fullmatch(name) or ".." in name or "/" in name:
                 raise at.fault("BBT0604", f"'{clip(name)}' cannot name an export: give its file")
+            own = modules.default_file(form, tree, forms) if form == name else None
             # A format of several files goes into a folder of its own.
-            file = f"{self.output}/{tree}{part}{exporter.suffix or f'-{form}'}"
+            file = f"{self.output}/{own or f'{tree}{part}' + (exporter.suffix or f'-{form}')}"
         self.places.claim(at, file, f"{tree}, {name}", folder=not exporter.suffix)
         span = self.marked.span(at.path)
         return Export(name, form, file, options, not exporter.suffix, span)
@@ -266,6 +279,12 @@ class _Reader:
         if self.left < 0:
             self.faults.add(at.fault("BBT0005", f"the trees have more than {MOST_VALUES} settings in all"))
             raise Stop
+
+
+def _form(name: str, at: At) -> str:
+    """The format of an export, as far as it can be told before it is read."""
+    given = at.value.get("format", name) if isinstance(at.value, dict) else name
+    return str(given)
 
 
 # --- single values ---------------------------------------------------------------------------

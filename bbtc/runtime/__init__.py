@@ -7,22 +7,25 @@ from bbtc.runtime.beliefs import Beliefs
 from bbtc.runtime.nodes import (
     Action,
     Condition,
+    Fact,
     Latch,
     Retry,
     Skipper,
     StopWhenBlocked,
     Try,
+    WithBeliefs,
     WithSetup,
     all_of,
     any_of,
     fallback,
+    in_words,
     negated,
     retry,
     run,
     sequence,
     skipper,
 )
-from bbtc.runtime.world import Fact, Factor, Outcome, State, When, World, draw, happen, in_words, simulate
+from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
 __all__ = [
     "Action",
@@ -38,6 +41,7 @@ __all__ = [
     "StopWhenBlocked",
     "Try",
     "When",
+    "WithBeliefs",
     "WithSetup",
     "World",
     "all_of",

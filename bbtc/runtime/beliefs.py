@@ -34,6 +34,11 @@ class Beliefs:
             return value
         raise TypeError(f"{self.key(*fact)} is {value!r}, not True, False or None")
 
+    def heard_of(self, *fact: str, unknown: bool = True) -> bool:
+        """Whether anything was believed of a fact yet: that it is true or false, or, where
+        ``unknown`` will do, unknown."""
+        return Blackboard.exists(self.key(*fact)) and (unknown or self.value(*fact) is not None)
+
     def believe(self, value: bool | None, *fact: str) -> None:
         """From now on, this is believed of a fact."""
         Blackboard.set(self.key(*fact), value)

@@ -12,9 +12,8 @@ from typing import TypeVar
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bbtc.runtime.nodes import run
+from bbtc.runtime.nodes import Fact, in_words, run
 
-Fact = tuple[str, ...]
 State = dict[Fact, bool | None]
 T = TypeVar("T")
 
@@ -100,11 +99,6 @@ class World:
         told = ", ".join(f"{in_words(fact)} {words[value]}" for fact, value in changes.items())
         self._report(f"{in_words(action)}: {told or 'no change'}")
         return Status.SUCCESS
-
-
-def in_words(fact: Fact) -> str:
-    """``predicate(object,…)``."""
-    return f"{fact[0]}({','.join(fact[1:])})"
 
 
 def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) -> None:

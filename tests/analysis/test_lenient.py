@@ -45,8 +45,8 @@ SLIPS = [
 def test_a_slip_is_a_name_of_its_own(slip: dict[str, str]) -> None:
     """An interpreter that knows no declarations, to which every word is what it says, is the judge."""
     text = SHED.format(**{**RIGHT, **slip})
-    space = Lifted.of(text).space()
-    expected = space.mean(space.best())
+    space = Lifted.of(text).space
+    expected = space.mean(space.best)
     report = Report()
     model = bbtc.load(SourceFile("shed.pddl", text), lenient=True, report=report)
     assert "BBT0230" in {each.code for each in report}

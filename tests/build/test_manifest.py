@@ -323,6 +323,29 @@ def test_the_schema_knows_every_strategy() -> None:
     assert (set(strategy["enum"]), strategy["default"]) == (set(STRATEGIES), DEFAULT)
 
 
+@pytest.mark.parametrize(
+    ("trees", "message"),
+    [
+        ("a: {domain: d, exports: [dot, dot]}", "build/a.dot is made twice"),
+        ("a: {domain: d, exports: {dot: x/./y, svg: x//y}}", "x/y is made twice"),
+        ("a: {domain: d, exports: {dot: x/y}}, b: {domain: d, exports: {dot: ./x/y}}", "x/y is made twice"),
+        ("a: {domain: d, tree: x}, b: {domain: d, exports: {svg: x/y}}", "x/y is inside the file"),
+        ("a: {domain: d, exports: {svg: x/y/z}}, b: {domain: d, tree: x}", "x/y/z is inside the file"),
+        ("a: {domain: d, exports: {btcpp_project: p, btcpp: p/tree.xml}}", "is inside the folder"),
+        ("a: {domain: d, exports: {btcpp: p/tree.xml, btcpp_project: p}}", "p/tree.xml is inside the folder"),
+        ("a: {domain: d, exports: {btcpp_project: p, q: {format: btcpp_project, file: p/q}}}", "is inside the folder"),
+        ("a: {domain: d, exports: {py_trees_robot: r.py, dot: r.py.new}}", "differ by .new only"),
+        ("a: {domain: d, exports: {dot: r.py.new, py_trees_robot: r.py}}", "differ by .new only"),
+        ("a-b: {domain: d, exports: [py_trees_robot]}, a_b: {domain: d, exports: [py_trees_robot]}",
+         "build/a_b_robot.py is made twice"),
+    ],
+)  # fmt: skip
+def test_exports_that_would_write_over_each_other_are_refused(trees: str, message: str) -> None:
+    (fault,) = faults(f"trees: {{{trees}}}\n")
+    assert fault[0] == "BBT1003"
+    assert message in fault[2]
+
+
 # --- how much ----------------------------------------------------------------------------------
 
 IN_TOML = "[tool.bbtc.trees.a]\ndomain = 'd'\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 from dataclasses import replace
@@ -17,6 +18,8 @@ from hypothesis import strategies as st
 
 from bbtc.export import cppcode
 from bbtc.export.btcpp_project import btcpp_project
+from bbtc.export.interface import action_symbol
+from bbtc.export.world_model import actions_used
 from bbtc.ground.condition import TRUE, And, Is, Known
 from bbtc.ground.task import (
     Effect,
@@ -92,6 +95,84 @@ def test_the_program_of_a_domain_compiles_and_succeeds_as_often_as_simulated(
     assert (done.returncode, done.stdout) == (0, "The tree returned FAILURE.\n")
     todo = "to do: doDrive lobby" if name.startswith("charging") else "to do: doLightOn"
     assert todo in done.stderr.splitlines()
+
+
+def test_a_stub_says_which_conditions_are_to_be_written_where_they_block_a_guard(tmp_path: Path) -> None:
+    """Neither action is ever started, so that only the conditions can tell."""
+    tree = soda_tree()
+    guards = (Is(0, Truth.TRUE), Is(1, Truth.TRUE))
+    actions = tuple(
+        replace(action, precondition=guard) for action, guard in zip(tree.task.actions, guards, strict=True)
+    )
+    attempts = tuple(
+        ActionNode(f"a{number}", action.name, guarded=True) for number, action in enumerate(actions)
+    )
+    tree = replace(
+        tree, task=replace(tree.task, actions=actions), root=ControlNode("r", "fallback", attempts)
+    )
+    build = built(tmp_path, tree)
+    done = subprocess.run([build / "main"], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (0, "The tree returned FAILURE.\n")
+    assert done.stderr.splitlines() == [
+        "to do: isLuminousityOk, false until then",
+        "to do: isSeen soda, unknown until then",
+    ]
+
+
+def test_a_static_library_that_leaves_threads_to_others_is_found(tmp_path: Path) -> None:
+    """As CMake writes its package where BTCPP_SHARED_LIBS is off: it names a target of a package that it
+    does not look for."""
+    if shutil.which("cmake") is None or shutil.which("c++") is None:
+        pytest.skip("no cmake and c++ on the PATH")
+    package = """add_library(BT::behaviortree_cpp INTERFACE IMPORTED)
+set_target_properties(BT::behaviortree_cpp PROPERTIES
+                      INTERFACE_LINK_LIBRARIES "\\$<LINK_ONLY:Threads::Threads>")
+"""
+    source = write(tmp_path / "source", files(soda_tree()))
+    write(tmp_path / "package", {"behaviortree_cppConfig.cmake": package})
+    configure = ["cmake", "-S", str(source), "-B", str(tmp_path / "build")]
+    found = f"-Dbehaviortree_cpp_DIR={tmp_path / 'package'}"
+    done = subprocess.run([*configure, found], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+ROBOT = """#include "robot_stub.hpp"
+#define MyRobot WORD
+namespace robot_tree {
+class WORD : public Robot {
+ public:
+  bool isLuminousityOk() override { return std::cout << "WORD\\n", false; }
+  std::optional<bool> isSeen(const std::string&) override { return std::nullopt; }
+  BT::NodeStatus doLightOn() override { return BT::NodeStatus::FAILURE; }
+  BT::NodeStatus doDetect(const std::string&) override { return BT::NodeStatus::FAILURE; }
+};
+}  // namespace robot_tree
+"""
+
+
+def test_a_robot_that_comes_changes_or_goes_is_noticed_by_the_build(tmp_path: Path) -> None:
+    """By that of CMake's default generator, or of the one that the environment names (CMAKE_GENERATOR)."""
+    require_library()
+    source, build = write(tmp_path / "source", files(soda_tree())), tmp_path / "build"
+    configure = ["cmake", "-S", str(source), "-B", str(build), "-DCMAKE_CXX_FLAGS=-O0"]
+    subprocess.run(configure, check=True, capture_output=True, timeout=300)
+    robot = source / "my_robot.hpp"
+
+    def said() -> str:
+        make = ["cmake", "--build", str(build), "--target", "main"]
+        done = subprocess.run(make, capture_output=True, text=True, timeout=540, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        done = subprocess.run([build / "main"], capture_output=True, text=True, timeout=60, check=False)
+        return "".join(dict.fromkeys(done.stdout.splitlines()))
+
+    stub = said()
+    robot.write_text(ROBOT.replace("WORD", "First"), encoding="utf-8")
+    os.utime(robot, (1, 1))  # copied with its old time
+    assert said() == f"First{stub}"
+    robot.write_text(ROBOT.replace("WORD", "Second"), encoding="utf-8")
+    assert said() == f"Second{stub}"
+    robot.unlink()
+    assert said() == stub
 
 
 TIRELESS = """#include <iostream>
@@ -199,11 +280,9 @@ def test_a_program_full_of_hostile_names_compiles_and_runs(nodes: str, tmp_path:
 FIELD = re.compile(r"(?!.*__)[a-z][a-z0-9_]*[a-z0-9]|[a-z]")  # what ROS 2 takes for the name of a field
 
 
-@pytest.mark.parametrize("leaves", ["ros2-actions", "ros2-services"])
-def test_the_flavours_for_ros_are_valid_cpp(leaves: str, tmp_path: Path) -> None:
-    """Against stand-ins for the headers of ROS 2, and the headers of BehaviorTree.CPP itself."""
-    require_library()
-    folder = write(tmp_path, files(hostile_tree(), leaves=leaves, nodes="bbtc"))
+def ros_package(folder: Path, tree: Tree, leaves: str) -> Path:
+    """The files of a package for ROS 2, and the headers that ROS 2 would make of its interfaces."""
+    write(folder, files(tree, leaves=leaves, nodes="bbtc"))
     package = re.search(r"project\((\w+)", (folder / "CMakeLists.txt").read_text())
     assert package is not None
     made = 0
@@ -215,14 +294,90 @@ def test_the_flavours_for_ros_are_valid_cpp(leaves: str, tmp_path: Path) -> None
                 {f"{package.group(1)}/{kind}/{snake(file.stem)}.hpp": interface(file, package.group(1))},
             )
             made += 1
-    assert made == 2 + len(hostile_tree().task.actions)
+    assert made == 2 + len({action_symbol(action) for action in actions_used(tree)})
+    return folder
+
+
+@pytest.mark.parametrize("leaves", ["ros2-actions", "ros2-services"])
+def test_the_flavours_for_ros_are_valid_cpp(leaves: str, tmp_path: Path) -> None:
+    """Against stand-ins for the headers of ROS 2, and the headers of BehaviorTree.CPP itself."""
+    require_library()
+    folder = ros_package(tmp_path, hostile_tree(), leaves)
     flags = ["-std=c++17", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", '-DTREE_FILE="x"']
     flags += [f"-I{folder}", f"-I{STUBS}", *(f"-isystem{path}/include" for path in library_prefix())]
+    flags += ["-DLATER_ROS_NODE_PARAMS"] if leaves == "ros2-services" else []
     done = subprocess.run(
         ["c++", *flags, "main.cpp"],
         cwd=folder, capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+NODE_CMAKE = """cmake_minimum_required(VERSION 3.16)
+project(node CXX)
+set(CMAKE_CXX_STANDARD 17)
+find_package(Threads REQUIRED)
+find_package(behaviortree_cpp REQUIRED)
+add_executable(node "STUBS/run_node.cpp")
+target_include_directories(node PRIVATE .. "STUBS")
+target_compile_definitions(node PRIVATE TREE_FILE="${CMAKE_CURRENT_SOURCE_DIR}/../tree.xml")
+target_link_libraries(node BT::behaviortree_cpp)
+"""
+
+
+@pytest.fixture(scope="module")
+def node(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program of a package for ROS 2, made with stand-ins for ROS 2: it is told what is published, see
+    ``run_node.cpp``. Servers tell when they are asked, and do what they are asked at once."""
+    require_library()
+    folder = ros_package(tmp_path_factory.mktemp("ros"), soda_tree(), "ros2-actions")
+    write(folder / "run", {"CMakeLists.txt": NODE_CMAKE.replace("STUBS", str(STUBS))})
+    done = cmake_build(folder / "run", folder / "build", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "build" / "node"
+
+
+def published(node: Path, *beliefs: str) -> list[str]:
+    """What the node says; ``beliefs`` are published before one tick after the other."""
+    done = subprocess.run([node, *beliefs], capture_output=True, text=True, timeout=60, check=False)
+    return done.stdout.splitlines()
+
+
+def test_a_node_is_not_ticked_before_every_condition_has_been_told(node: Path) -> None:
+    """Nothing is asked of the robot until the light, which is never unknown, has been told; the can may be
+    unknown, and is where a message does not name it."""
+    said = published(node)
+    assert said == [
+        "warning: waiting for the topic beliefs to tell of LuminousityOk(), Seen(soda)",
+        "info: the tree returned RUNNING",
+    ]
+    light_missing = [
+        "publish Seen|soda=2",
+        "warning: waiting for the topic beliefs to tell of LuminousityOk()",
+        "info: the tree returned RUNNING",
+    ]
+    assert published(node, "Seen|soda=2", "", "") == light_missing  # told once
+    for light in ("nothing", "LuminousityOk=1", "Seen|can=0;LuminousityOk|soda=0"):
+        assert not any(line.startswith("ask") for line in published(node, light, "", "")), light
+    assert published(node, "", "LuminousityOk=0", "")[1:3] == ["publish LuminousityOk=0", "ask light_on"]
+
+
+def test_an_unknown_can_is_looked_for_and_a_lost_light_starts_nothing(node: Path) -> None:
+    lit = "LuminousityOk=2"
+    assert published(node, lit, "", f"{lit};Seen|soda=2", "") == [
+        f"publish {lit}",
+        "ask detect",
+        f"publish {lit};Seen|soda=2",
+        "info: the tree returned SUCCESS",
+    ]
+    # Neither lit nor dark: the search ends, and the light is not switched on either.
+    assert published(node, lit, "nothing", "", "") == [
+        f"publish {lit}",
+        "ask detect",
+        "publish nothing",
+        "cancel detect",
+        "info: the tree returned FAILURE",
+    ]
 
 
 def snake(name: str) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import types
 from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import pytest
@@ -13,8 +15,11 @@ from hypothesis import strategies as st
 from bbtc.diagnostics import BbtcError
 from bbtc.export.names import module_name
 from bbtc.export.registry import load_exporter, parse_options
+from bbtc.ground.condition import Is
+from bbtc.ground.task import InitialState
+from bbtc.kleene import Truth
 from bbtc.runtime import Beliefs, Condition, Latch, StopWhenBlocked, Try, retry, run, sequence, skipper
-from bbtc.tree.nodes import Tree
+from bbtc.tree.nodes import ActionNode, ControlNode, Tree
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 py_trees = pytest.importorskip("py_trees")
@@ -181,7 +186,7 @@ def test_the_robot_starts_with_what_the_problem_says_and_believes_what_it_is_tol
     module = robot_of(soda_tree(), namespace="/left/arm/")
     robot = module.MyRobot()
     board = py_trees.blackboard.Blackboard
-    assert dict(board.storage) == {"/left/arm/luminousity_ok": False}
+    assert dict(board.storage) == {"/left/arm/luminousity_ok": False, "/left/arm/seen/soda": None}
     assert robot.luminousity_ok() is False
     assert robot.seen("soda") is None
     board.set("/left/arm/luminousity_ok", True)
@@ -189,6 +194,124 @@ def test_the_robot_starts_with_what_the_problem_says_and_believes_what_it_is_tol
     assert robot.luminousity_ok() is True
     assert robot.seen("soda") is True
     assert module.run(module.create_root(robot)) is Status.SUCCESS
+
+
+def undecided_tree() -> Tree:
+    """The soda tree of a problem that does not say whether there is light."""
+    tree = soda_tree()
+    (start,) = tree.task.initial
+    light, can = start.values
+    assert (light, can) == (Truth.FALSE, Truth.UNKNOWN)
+    starts = tuple(InitialState(Fraction(1, 2), (value, can)) for value in (Truth.FALSE, Truth.TRUE))
+    return replace(tree, task=replace(tree.task, initial=starts))
+
+
+class Asked:
+    """Makes the actions of a robot remember that they were asked for, and end at once."""
+
+    def __init__(self, robot: Any) -> None:
+        self.actions: list[str] = []
+        for name in ("light_on", "detect"):
+            setattr(robot, name, self._act(name))
+
+    def _act(self, name: str) -> Any:
+        def act(*_: str) -> object:
+            self.actions.append(name)
+            return Status.SUCCESS
+
+        return act
+
+
+def test_a_tree_waits_until_its_robot_has_heard_of_every_fact_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    module = robot_of(undecided_tree(), namespace="home")
+    robot = module.MyRobot()
+    asked, board = Asked(robot), py_trees.blackboard.Blackboard
+    clock = [100.0]
+    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+    root = module.create_root(robot)
+    waiting = "waiting to hear of luminousity_ok()"
+    for now in (100.0, 101.0, 109.0, 111.0):
+        clock[0] = now
+        root.tick_once()
+        assert (root.status, root.feedback_message, asked.actions) == (Status.RUNNING, waiting, [])
+    assert capsys.readouterr().out.count(waiting) == 2  # at once, and after ten seconds
+    # It is never unknown in the domain: that nobody knows it yet is no answer.
+    board.set("/home/luminousity_ok", None)
+    root.tick_once()
+    assert asked.actions == []
+    board.set("/home/luminousity_ok", True)
+    root.tick_once()
+    assert (root.status, root.feedback_message, asked.actions) == (Status.RUNNING, "", ["detect"])
+
+
+def test_a_can_that_may_be_unknown_is_waited_for_until_it_is_said_to_be_unknown() -> None:
+    module = robot_of(soda_tree(), namespace="home")
+    robot = module.MyRobot()
+    asked = Asked(robot)
+    py_trees.blackboard.Blackboard.clear()  # of what the problem says
+    root = module.create_root(robot)
+    robot._beliefs.believe(True, "luminousity_ok")
+    root.tick_once()
+    assert (root.status, asked.actions) == (Status.RUNNING, [])
+    robot._beliefs.believe(None, "seen", "soda")
+    root.tick_once()
+    assert (root.status, asked.actions) == (Status.RUNNING, ["detect"])
+
+
+def test_what_is_not_known_any_more_is_not_false() -> None:
+    """The light, which is never unknown in the domain: where it is false, it would be switched on."""
+    module = robot_of(soda_tree(), namespace="home")
+    robot = module.MyRobot()
+    asked = Asked(robot)
+    robot._beliefs.believe(True, "luminousity_ok")
+    root = module.create_root(robot)
+    root.tick_once()
+    assert asked.actions == ["detect"]
+    robot._beliefs.believe(None, "luminousity_ok")
+    root.tick_once()
+    assert (root.status, asked.actions) == (Status.FAILURE, ["detect"])
+
+
+def test_a_robot_that_keeps_no_beliefs_is_not_waited_for() -> None:
+    class Knowing:
+        def luminousity_ok(self) -> bool:
+            return True
+
+        def seen(self, _: str) -> bool:
+            return True
+
+        detect = light_on = cancel = seen
+
+    module = robot_of(soda_tree())
+    assert module.run(module.create_root(Knowing())) is Status.SUCCESS
+
+
+def test_a_robot_whose_actions_are_not_started_tells_which_and_why(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    tree = soda_tree()
+    guards = (Is(1, Truth.TRUE), Is(0, Truth.TRUE))
+    detect, light_on = (
+        replace(action, precondition=guard) for action, guard in zip(tree.task.actions, guards, strict=True)
+    )
+    attempts = (ActionNode("a", light_on.name, guarded=True), ActionNode("b", detect.name, guarded=True))
+    tree = replace(
+        tree, task=replace(tree.task, actions=(detect, light_on)), root=ControlNode("r", "fallback", attempts)
+    )
+    robot_of(tree).main()
+    *_, told = capsys.readouterr().out.splitlines()
+    blocked = "blocked: nothing can observe what is unknown"
+    assert (
+        told == f"{blocked}; light_on(): its precondition is false; detect(soda): its precondition is unknown"
+    )
+    tree = replace(tree, root=ControlNode("r", "sequence", attempts))
+    robot_of(tree).main()
+    assert capsys.readouterr().out.splitlines() == [
+        "The tree returned FAILURE.",
+        "no action was started; light_on(): its precondition is false",
+    ]
 
 
 @given(trees(HOSTILE_NAMES))

@@ -5,7 +5,7 @@
 
 #include "leaves.hpp"
 
-#if __has_include("my_robot.hpp")
+#if defined(HAS_MY_ROBOT) || __has_include("my_robot.hpp")
 #include "my_robot.hpp"
 #else
 #include "robot_stub.hpp"

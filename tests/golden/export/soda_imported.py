@@ -45,7 +45,7 @@ class Robot(Protocol):
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
-    def luminousity_ok(self) -> bool:
+    def luminousity_ok(self) -> bool | None:
         """Whether luminousity_ok() holds."""
 
     def seen(self, arg: str) -> bool | None:
@@ -87,7 +87,12 @@ def create_root(robot: Robot) -> Behaviour:
                 Condition("seen(soda)", lambda: robot.seen("soda")),
             ),
         ),
+        READS,
     )
+
+
+READS: dict[Fact, bool] = {("luminousity_ok",): False, ("seen", "soda"): True}
+"""The facts that the tree reads, and whether they can be unknown."""
 
 
 INITIAL: list[tuple[str, State]] = [("1", {("luminousity_ok",): False, ("seen", "soda"): None})]
@@ -106,8 +111,8 @@ ACTIONS: dict[Fact, list[Factor]] = {
 class SimulatedWorld(World):
     """Plays the robot."""
 
-    def luminousity_ok(self) -> bool:
-        return self._value("luminousity_ok") is True
+    def luminousity_ok(self) -> bool | None:
+        return self._value("luminousity_ok")
 
     def seen(self, arg: str) -> bool | None:
         return self._value("seen", arg)

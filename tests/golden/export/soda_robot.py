@@ -1,8 +1,7 @@
 """The robot of look_for_soda.py for the problem look-for-soda. Begun by bbtc, to be filled in.
 
-    python look_for_soda_robot.py
-
-runs the tree. In ROS, give create_root(MyRobot()) to py_trees_ros.trees.BehaviourTree.
+As a program, this file runs the tree. In ROS, give create_root(MyRobot()) to
+py_trees_ros.trees.BehaviourTree.
 """
 
 from __future__ import annotations
@@ -43,6 +42,11 @@ class Beliefs:
             return value
         raise TypeError(f"{self.key(*fact)} is {value!r}, not True, False or None")
 
+    def heard_of(self, *fact: str, unknown: bool = True) -> bool:
+        """Whether anything was believed of a fact yet: that it is true or false, or, where
+        ``unknown`` will do, unknown."""
+        return Blackboard.exists(self.key(*fact)) and (unknown or self.value(*fact) is not None)
+
     def believe(self, value: bool | None, *fact: str) -> None:
         """From now on, this is believed of a fact."""
         Blackboard.set(self.key(*fact), value)
@@ -55,17 +59,22 @@ class MyRobot:
         self._beliefs = Beliefs("household", "look-for-soda")
         # What the problem says of the start:
         self._beliefs.believe(False, "luminousity_ok")
+        self._beliefs.believe(None, "seen", "soda")
 
     def setup(self, **kwargs: Any) -> None:
         """Called once, before the first tick. In ROS, kwargs["node"] is the node."""
+
+    def heard_of(self, *fact: str, unknown: bool) -> bool:
+        """Whether anything is believed of a fact. The tree waits for that before its first tick."""
+        return self._beliefs.heard_of(*fact, unknown=unknown)
 
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
         print("stop", action)
 
-    def luminousity_ok(self) -> bool:
+    def luminousity_ok(self) -> bool | None:
         """Whether luminousity_ok() holds."""
-        return self._beliefs.value("luminousity_ok") is True
+        return self._beliefs.value("luminousity_ok")
 
     def seen(self, arg: str) -> bool | None:
         """Whether seen(arg) holds; None where that is unknown."""
@@ -89,7 +98,10 @@ class MyRobot:
 def main() -> None:
     """Run the tree with this robot."""
     robot: Robot = MyRobot()
-    print(f"The tree returned {run(create_root(robot), period=0.1).value}.")
+    root = create_root(robot)
+    print(f"The tree returned {run(root, period=0.1).value}.")
+    if root.feedback_message:
+        print(root.feedback_message)
 
 
 if __name__ == "__main__":

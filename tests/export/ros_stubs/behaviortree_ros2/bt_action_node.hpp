@@ -17,5 +17,17 @@ class RosActionNode : public RosStubNode {
   virtual bool setGoal(Goal& goal) = 0;
   virtual NodeStatus onResultReceived(const WrappedResult& result) = 0;
   virtual NodeStatus onFailure(ActionNodeErrorCode) { return NodeStatus::FAILURE; }
+
+ private:
+  bool ask() override {
+    Goal goal;
+    return setGoal(goal);
+  }
+
+  NodeStatus answer() override {
+    WrappedResult result{std::make_shared<typename ActionT::Result>()};
+    result.result->success = true;
+    return onResultReceived(result);
+  }
 };
 }  // namespace BT

@@ -15,5 +15,17 @@ class RosServiceNode : public RosStubNode {
   virtual bool setRequest(typename Request::SharedPtr& request) = 0;
   virtual NodeStatus onResponseReceived(const typename Response::SharedPtr& response) = 0;
   virtual NodeStatus onFailure(ServiceNodeErrorCode) { return NodeStatus::FAILURE; }
+
+ private:
+  bool ask() override {
+    auto request = std::make_shared<Request>();
+    return setRequest(request);
+  }
+
+  NodeStatus answer() override {
+    auto response = std::make_shared<Response>();
+    response->success = true;
+    return onResponseReceived(response);
+  }
 };
 }  // namespace BT

@@ -1,5 +1,6 @@
-// As much of behaviortree_ros2 as generated code uses, to check its syntax without ROS.
+// As much of behaviortree_ros2 as generated code uses, to compile and run it without ROS. Servers answer at once.
 #pragma once
+#include <cstdio>
 #include <memory>
 #include <string>
 
@@ -8,19 +9,44 @@
 
 namespace BT {
 struct RosNodeParams {
+#ifdef LATER_ROS_NODE_PARAMS
+  std::weak_ptr<rclcpp::Node> nh;
+#else
   std::shared_ptr<rclcpp::Node> nh;
+#endif
   std::string default_port_value;
 };
 
-/// The part that the nodes for actions, services and topics share here.
+/// The part that the nodes for actions and services share here: a request in the first tick, which is printed,
+/// and its answer in the next.
 class RosStubNode : public ActionNodeBase {
  public:
-  RosStubNode(const std::string& name, const NodeConfig& config, const RosNodeParams&)
-      : ActionNodeBase(name, config) {}
-  void halt() override {}
-  NodeStatus tick() override { return NodeStatus::FAILURE; }
+  RosStubNode(const std::string& name, const NodeConfig& config, const RosNodeParams& params)
+      : ActionNodeBase(name, config), server_(params.default_port_value) {}
+
+  void halt() override {
+    if (status() == NodeStatus::RUNNING) {
+      std::printf("cancel %s\n", server_.c_str());
+    }
+    resetStatus();
+  }
 
  protected:
+  NodeStatus tick() override {
+    if (status() == NodeStatus::RUNNING) {
+      return answer();
+    }
+    setStatus(NodeStatus::RUNNING);
+    if (!ask()) {
+      return NodeStatus::FAILURE;
+    }
+    std::printf("ask %s\n", server_.c_str());
+    return NodeStatus::RUNNING;
+  }
+
+  virtual bool ask() = 0;
+  virtual NodeStatus answer() = 0;
+
   static PortsList withBasic(const char* basic, PortsList addition) {
     PortsList all = {InputPort<std::string>(basic, "", "")};
     for (const auto& port : addition) {
@@ -30,5 +56,8 @@ class RosStubNode : public ActionNodeBase {
     }
     return all;
   }
+
+ private:
+  std::string server_;
 };
 }  // namespace BT
