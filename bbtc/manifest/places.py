@@ -60,7 +60,7 @@ class Places:
                 what = "is a folder of" if claim.folder else "is the folder of"
                 yield claim.at.fault("BBT1009", f"{claim.file} {what} the source {around[parts]}")
             other = owners.setdefault(parts, claim)
-            if other.owner != claim.owner:
+            if other is not claim:
                 owners_of_it = f"'{other.owner}' and for '{claim.owner}'"
                 yield _twice(claim, f"{claim.file} is made twice: for {owners_of_it}")
         for parts, claim in owners.items():

@@ -333,7 +333,7 @@ def test_the_schema_knows_every_strategy() -> None:
         ("a: {domain: d, exports: {svg: x/y/z}}, b: {domain: d, tree: x}", "x/y/z is inside the file"),
         ("a: {domain: d, exports: {btcpp_project: p, btcpp: p/tree.xml}}", "is inside the folder"),
         ("a: {domain: d, exports: {btcpp: p/tree.xml, btcpp_project: p}}", "p/tree.xml is inside the folder"),
-        ("a: {domain: d, exports: {btcpp_project: p, q: {format: btcpp_project, file: p/q}}}", "is inside the folder"),
+        ("a: {domain: d, exports: {btcpp_project: p, q: {format: btcpp_project, file: p/q}}}", "is inside"),
         ("a: {domain: d, exports: {py_trees_robot: r.py, dot: r.py.new}}", "differ by .new only"),
         ("a: {domain: d, exports: {dot: r.py.new, py_trees_robot: r.py}}", "differ by .new only"),
         ("a-b: {domain: d, exports: [py_trees_robot]}, a_b: {domain: d, exports: [py_trees_robot]}",
