@@ -182,7 +182,7 @@ class Golden:
         try:
             write(str(path), content, check=not self.update)
         except BbtcError as error:
-            told = error.diagnostics[0].message
+            told = error.diagnostics[0].told
             pytest.fail(f"{told}\n(pytest --bbtc-update accepts it)", pytrace=False)
 
 

@@ -14,7 +14,7 @@ import click
 
 from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERRUPTED, EXIT_LIMIT
 from bbtc.cli.session import (
-    MOST,
+    Count,
     Probability,
     Session,
     limit_options,
@@ -49,9 +49,7 @@ STATUS_EXIT: dict[Status, int] = {
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
 @click.option("--strategy", default=DEFAULT, show_default=True, help="Or auto, search, policy, refine.")
-@click.option(
-    "--max-actions", type=click.IntRange(0, MOST), metavar="K", help="Let no run take more actions."
-)
+@click.option("--max-actions", type=Count(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",
     type=click.Choice(["least", "unbounded"]),

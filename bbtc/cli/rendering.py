@@ -11,6 +11,7 @@ from urllib.parse import quote
 from bbtc.artefacts.jsontext import escaped
 from bbtc.codes import CODES
 from bbtc.diagnostics import Diagnostic, Severity
+from bbtc.printable import printable_line
 from bbtc.source import Span
 from bbtc.version import __version__
 
@@ -127,5 +128,6 @@ def _as_github(diagnostic: Diagnostic) -> str:
 
 
 def _escape(text: str, more: str = "") -> str:
-    """Percent-encode what would end a workflow command or one of its properties."""
-    return "".join(f"%{ord(c):02X}" if c in "%\r\n" + more else c for c in text)
+    """Percent-encode what would end a workflow command or one of its properties; nothing else that does not
+    print is left."""
+    return "".join(f"%{ord(c):02X}" if c in "%\r\n" + more else printable_line(c) for c in text)

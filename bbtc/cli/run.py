@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bbtc.cli.output import on_terminal, show
-from bbtc.cli.session import MOST, Session, limit_options
+from bbtc.cli.session import Count, Seed, Session, limit_options
 from bbtc.cli.session import command as session_command
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def _choices(_ctx: click.Context, _parameter: click.Parameter, value: str | None
 @click.argument("tree", metavar="TREE")
 @click.option(
     "--seed",
-    type=click.IntRange(-MOST, MOST),
+    type=Seed(),
     default=0,
     show_default=True,
     help="Seed of the outcomes that are drawn.",
@@ -53,7 +53,7 @@ def _choices(_ctx: click.Context, _parameter: click.Parameter, value: str | None
 )
 @click.option(
     "--steps",
-    type=click.IntRange(0, MOST),
+    type=Count(0),
     default=1000,
     show_default=True,
     help="Most actions of a run that nobody steers.",

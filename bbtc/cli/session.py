@@ -242,8 +242,31 @@ def problem_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 _MIB = 1 << 20
-MOST = 10**12
-"""Largest number that an option takes: more than anybody needs, and no more than the system can count."""
+_MOST = 10**12  # of an option: more than anybody needs, and no more than the system can count
+
+
+class Count(click.IntRange):
+    """A whole number from a bound on, which the system can count to."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number; one that is too large is wrong usage."""
+        number: int = super().convert(value, param, ctx)
+        if abs(number) > _MOST:
+            self.fail(f"{number} is larger than {_MOST}", param, ctx)
+        return number
+
+
+class Seed(Count):
+    """Any whole number that the system can count to."""
+
+    name = "integer"
+
+    def __init__(self) -> None:
+        super().__init__()
+
+    def _describe_range(self) -> str:
+        return ""
+
 
 # Option, field of Limits, smallest and largest value, unit (1: as it is), help.
 _READING = (
@@ -272,7 +295,7 @@ def _limits(*tables: _Table, timed: bool) -> Callable[[Callable[..., Any]], Call
             function = click.option(
                 option,
                 f"limit_{field_name}",
-                type=click.IntRange(least, MOST if most is None else most),
+                type=Count(least, most),
                 default=default,
                 show_default=True,
                 help=told,

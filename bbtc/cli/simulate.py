@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from bbtc.cli.session import MOST, Session, limit_options
+from bbtc.cli.session import Count, Seed, Session, limit_options
 from bbtc.cli.session import command as session_command
 from bbtc.diagnostics import LimitReached
 
@@ -20,18 +20,12 @@ if TYPE_CHECKING:
 
 @click.command("simulate")
 @click.argument("tree", metavar="TREE")
-@click.option(
-    "--scenarios", type=click.IntRange(0, MOST), default=0, metavar="N", help="List the N most probable runs."
-)
-@click.option(
-    "--samples", type=click.IntRange(1, MOST), metavar="N", help="Also sample N runs (Monte Carlo)."
-)
-@click.option(
-    "--seed", type=click.IntRange(-MOST, MOST), default=0, show_default=True, help="Seed of the sampling."
-)
+@click.option("--scenarios", type=Count(0), default=0, metavar="N", help="List the N most probable runs.")
+@click.option("--samples", type=Count(1), metavar="N", help="Also sample N runs (Monte Carlo).")
+@click.option("--seed", type=Seed(), default=0, show_default=True, help="Seed of the sampling.")
 @click.option(
     "--failing",
-    type=click.IntRange(0, MOST),
+    type=Count(0),
     default=3,
     show_default=True,
     metavar="N",

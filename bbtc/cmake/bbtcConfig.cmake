@@ -50,6 +50,13 @@ function(bbtc_add_tree target)
     message(FATAL_ERROR "bbtc_add_tree: DOMAIN is missing")
   endif()
 
+  # Lists of CMake, and the makefiles that it writes, take such names for several, or for something else.
+  foreach(name IN ITEMS DOMAIN PROBLEM NAME OUTPUT_DIRECTORY)
+    if("${arg_${name}}" MATCHES "[;#%\n\"]|..:|:[^/\\]")
+      message(FATAL_ERROR "bbtc_add_tree: ${name} has a character that CMake cannot pass on: ${arg_${name}}")
+    endif()
+  endforeach()
+
   set(inputs)
   foreach(input IN ITEMS "${arg_DOMAIN}" "${arg_PROBLEM}")
     if(NOT input STREQUAL "")
@@ -83,10 +90,9 @@ function(bbtc_add_tree target)
   set(tree "${directory}/${arg_NAME}.tree.json")
   add_custom_command(
     OUTPUT "${tree}"
-    COMMAND "${BBTC_EXECUTABLE}" plan ${inputs} ${options} --quiet -o "${tree}" --depfile "${tree}.d"
+    COMMAND "${BBTC_EXECUTABLE}" plan ${inputs} ${options} --quiet -o "${tree}"
     COMMAND "${CMAKE_COMMAND}" -E touch "${tree}"
     DEPENDS ${inputs} "${BBTC_EXECUTABLE}"
-    DEPFILE "${tree}.d"
     COMMENT "Planning ${arg_NAME}"
     VERBATIM)
 

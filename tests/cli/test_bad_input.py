@@ -379,3 +379,56 @@ def test_a_hostile_name_does_not_steer_the_terminal(folder: Path, command: list[
     assert done.returncode == 0, done.stderr
     shown = done.stderr if command[0] == "plan" else done.stdout + done.stderr
     assert not [line for line in shown.split("\n") if not line.isprintable() or line.startswith("::")]
+
+
+HOSTILE_LINE = "\x1b]0;x\x07\u202e\x9b31m\x85\n::error::x"
+
+
+def hostile_tree(folder: Path) -> None:
+    """A tree, ``hostile.json``, whose ids, labels and names all try to steer the terminal."""
+    planned = bbtc("plan", "domain.pddl", "problem.pddl", "-o", "tree.json", folder=folder)
+    assert planned.returncode == 0
+    tree = json.loads((folder / "tree.json").read_text().replace("soda", json.dumps(HOSTILE_LINE)[1:-1]))
+    stack = [tree["root"]]
+    while stack:
+        node = stack.pop()
+        node["id"] += HOSTILE_LINE
+        node |= {key: node[key] + HOSTILE_LINE for key in ("template", "reason", "name") if key in node}
+        stack += node.get("children", [])
+    (folder / "hostile.json").write_text(json.dumps(tree))
+
+
+def test_no_id_and_no_label_steers_the_terminal(folder: Path) -> None:
+    hostile_tree(folder)
+    for command in (
+        "simulate hostile.json --scenarios 3",
+        "verify hostile.json --engine own",
+        "run --batch --full hostile.json",
+        "diff tree.json hostile.json",
+        "diff tree.json hostile.json --to markdown",
+        "export hostile.json --to text -O ids=true",
+        "export hostile.json --to json",
+        "simulate hostile.json --json --scenarios 1",
+        "import hostile.json --to text",
+    ):
+        done = bbtc(*command.split(), folder=folder)
+        assert done.returncode == 0, done.stderr
+        shown = done.stdout + done.stderr
+        assert not [line for line in shown.split("\n") if not line.isprintable() or line.startswith("::")], (
+            command
+        )
+
+
+@pytest.mark.parametrize("form", ["text", "json", "sarif", "github"])
+@pytest.mark.parametrize("name", [HOSTILE_LINE.replace("/", "_"), "a\udcffb"])
+def test_no_name_of_a_file_steers_what_reads_messages(folder: Path, name: str, form: str) -> None:
+    (folder / name).write_text("(define (domain d) (:predicates (p)) (:action a :effect (p ?x)))\n")
+    for file in (name, f"no-{name}"):
+        done = bbtc("--format", form, "check", file, folder=folder)
+        assert done.returncode == 1
+        assert "bug in bbtc" not in done.stderr
+        if form in {"json", "sarif"}:
+            json.loads(done.stderr)
+        for line in done.stderr.rstrip("\n").split("\n"):
+            assert line.isprintable()
+            assert line.startswith("::error ") == (form == "github")

@@ -294,3 +294,36 @@ def test_the_program_tells_where_the_package_is() -> None:
     from tests.domains.problems import bbtc
 
     assert bbtc("--cmake-dir").out.decode().strip() == str(CMAKE_DIR)
+
+
+# --- names -----------------------------------------------------------------------------------
+
+NAMED = """cmake_minimum_required(VERSION 3.20)
+project(robot NONE)
+find_package(bbtc REQUIRED)
+add_custom_target(robot ALL)
+bbtc_add_tree(robot DOMAIN [==[{name}]==] NAME t SUCCESS 0.5 EXPORTS dot=t.dot)
+"""
+
+
+@pytest.mark.parametrize("generator", GENERATORS)
+def test_a_name_with_odd_letters_is_built_like_any_other(source: Path, generator: str) -> None:
+    name = "a b$c'd&e=f(g).pddl"
+    (source / name).write_text(COIN)
+    (source / "CMakeLists.txt").write_text(NAMED.format(name=name))
+    build = configure(source, generator)
+    assert make(build) == ["plan", "export"]
+    assert make(build) == []
+    edit(source / name, "1/2", "3/4")
+    assert make(build) == ["plan", "export"]
+
+
+@pytest.mark.parametrize("name", ["a;b.pddl", "a#b.pddl", "a%b.pddl", "a:b.pddl", "ab:c.pddl"])
+def test_a_name_that_cmake_cannot_pass_on_is_refused(source: Path, name: str) -> None:
+    (source / name).write_text(COIN)
+    (source / "CMakeLists.txt").write_text(NAMED.format(name=name))
+    told = run(
+        tool("cmake"), "-S", source, "-B", source.parent / "build", f"-Dbbtc_DIR={CMAKE_DIR}",
+        f"-DBBTC_EXECUTABLE={program(source.parent)}", cwd=source, status=1,
+    )  # fmt: skip
+    assert "DOMAIN has a character that" in told
