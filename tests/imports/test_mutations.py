@@ -23,7 +23,7 @@ from tests.replay.reference import expected_ticks
 from tests.replay.ticks import TickWorld, random_script
 
 MUTANTS = amount(600, 20_000)
-RUN = amount(1200, 40_000)
+RUN = amount(800, 40_000)
 """Changed files whose behaviour is compared with the engine's, if they are read."""
 
 Parents = dict[ET.Element, ET.Element]
