@@ -66,7 +66,7 @@ def _compare_tree(text: str, lifted: Lifted, task: Task, strategy: str, best: fl
         chosen = "refine" if task.templates else strategy
         tree = plan_task(task, None, chosen, _LIMITS, lambda _: None).tree
         runs = TreeOnText(lifted, dumps(tree_to_json(tree))).runs()
-    except (LimitReached, Endless):
+    except (LimitReached, Endless, TooLarge):
         return "value"
     assert runs.faults == [], text
     figures = simulate_tree(tree, Limits())[0]
