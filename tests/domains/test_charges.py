@@ -13,13 +13,16 @@ from bbtc.cli.main import cli
 from bbtc.diagnostics import Severity
 from bbtc.source import SourceFile
 
-# A courier crosses once; what that costs and earns besides the 2 of the way is `{}`.
+# A courier crosses once; what that costs and earns besides the 2 of the way is `{}`. All that it may depend on can
+# change, but too late.
 COURIER = """(define (domain courier)
   (:requirements :typing :mdp :rewards :action-costs :conditional-effects :probabilistic-effects
     :non-deterministic :negative-preconditions :universal-effects :unknown)
   (:types lane)
   (:predicates (there) (wet) (icy) (dark) (shut ?l - lane))
   (:functions (total-cost) (toll ?l - lane))
+  (:action change :precondition (there)
+    :effect (and (not (wet)) (not (icy)) (dark) (forall (?l - lane) (oneof (shut ?l) (not (shut ?l))))))
   (:action cross :precondition (not (there))
     :effect (and (there) (increase (total-cost) 2) {})))
 (define (problem one-way) (:domain courier) (:objects a b c - lane)
