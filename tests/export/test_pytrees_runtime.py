@@ -240,7 +240,7 @@ def test_a_tree_waits_until_its_robot_has_heard_of_every_fact_and_says_so(
     # It is never unknown in the domain: that nobody knows it yet is no answer.
     board.set("/home/luminousity_ok", None)
     root.tick_once()
-    assert asked.actions == []
+    assert (root.status, root.feedback_message, asked.actions) == (Status.RUNNING, waiting, [])
     board.set("/home/luminousity_ok", True)
     root.tick_once()
     assert (root.status, root.feedback_message, asked.actions) == (Status.RUNNING, "", ["detect"])
