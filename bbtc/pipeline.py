@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Report, Severity
+from bbtc.diagnostics import BbtcError, Diagnostic, Related, Report, Severity
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
@@ -190,7 +190,7 @@ def _doubts(model: Model, limits: Limits) -> list[Diagnostic]:
     few = replace(limits, facts=min(limits.facts, _CHECKED_FACTS))
     try:
         found = goal_doubts(model, few)
-    except LimitReached:
+    except BbtcError:  # a limit, or what grounding refuses
         found = None
     return (list(hopeless(model)) if found is None else found) or list(not_unknown(model))
 

@@ -287,6 +287,8 @@ def test_a_derived_predicate_with_very_many_ways_to_prove_itself_is_refused(tmp_
     done = _run("compile", str(file), "-o", str(tmp_path / "task.json"))
     assert done.returncode == 1
     assert "BBT0408" in done.stderr
+    done = _run("check", str(file))
+    assert (done.returncode, "error" in done.stderr) == (0, False), "a check says what it can without that"
 
 
 @pytest.mark.parametrize("strategy", ["auto", "refine"])

@@ -20,6 +20,7 @@ LEAST = 0.9
 _WHOLE = ("tests/domains/test_golden.py", "tests/domains/test_figures.py")
 PACKAGES = {
     "bbtc/belief": (
+        *_WHOLE,
         "tests/belief",
         "tests/plan/test_simplify.py",
         "tests/plan/test_failing_runs.py",
@@ -28,23 +29,22 @@ PACKAGES = {
         "tests/export/test_text_formats.py",
         "tests/cli/test_run.py",
         "tests/plan/test_refine.py",
-        *_WHOLE,
     ),
     "bbtc/ground": (
+        *_WHOLE,
         "tests/ground",
         "tests/artefacts",
         "tests/domains/test_against_lifted.py",
         "tests/analysis",
         "tests/cli/test_limits.py",
-        *_WHOLE,
     ),
     "bbtc/plan": (
+        *_WHOLE,
         "tests/plan",
         "tests/verify/test_plans.py",
-        *_WHOLE,
         "tests/domains/test_against_lifted.py",
     ),
-    "bbtc/verify": ("tests/verify", "tests/export/test_text_formats.py", "tests/cli/test_limits.py", *_WHOLE),
+    "bbtc/verify": (*_WHOLE, "tests/verify", "tests/export/test_text_formats.py", "tests/cli/test_limits.py"),
     "bbtc/export": (
         "tests/export/test_names.py",
         "tests/export/test_text_formats.py",
