@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from bbtc.belief.absorption import components
+from bbtc.graph import components
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import figures
 from bbtc.belief.soundness import violations
