@@ -121,15 +121,21 @@ def cli(ctx: click.Context, debug: bool, diagnostic_format: str) -> None:
     DOMAIN and PROBLEM are files in the bbtc language, a superset of PPDDL; one file may hold both,
     and `-` is the standard input.
     """
-    ctx.obj = {"format": diagnostic_format}
+    ctx.obj = {"format": diagnostic_format, "started": ctx.obj}
     del debug  # read by main(), which must know it before anything can fail
+
+
+def _started() -> float:
+    from bbtc.watch import process_started
+
+    return process_started()
 
 
 def main() -> None:
     """Entry point of the program ``bbtc``."""
     debug = "--debug" in sys.argv
     try:
-        status = cli.main(standalone_mode=False)
+        status = cli.main(standalone_mode=False, obj=_started())
         sys.exit(status if isinstance(status, int) else 0)
     except click.ClickException as error:
         error.show()

@@ -70,6 +70,7 @@ def command(
     if not batch and sys.stdin.isatty() and sys.stdout.isatty():
         while not stepper.finished and (choice := taken.next(stepper.now.branches)) is not None:
             stepper.step(choice)
+        session.watch.off()  # who looks at a tree has all the time there is
         _interact(loaded, stepper, full)
         return 0
     color = sys.stdout.isatty() and "NO_COLOR" not in os.environ

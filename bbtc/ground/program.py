@@ -186,7 +186,8 @@ class ProgramBuilder:
         parts = list(formulas)
         simple = [part for part in parts if self._is_simple(part)]
         complex_ = [part for part in parts if not self._is_simple(part)]
-        near, far = [], []
+        near: list[mf.Formula] = []
+        far: list[mf.Formula] = []
         for part in complex_:
             (near if self._count(_read(part, scope)) <= _FEW else far).append(part)
         for part in far:

@@ -61,7 +61,7 @@ class TreeEntry:
     max_actions: int | None = None
     retries: Retries = "least"
     guarded: bool = False
-    limits: tuple[tuple[str, int], ...] = ()
+    limits: tuple[tuple[str, int | None], ...] = ()
     exports: tuple[Export, ...] = ()
     expect: tuple[Expectation, ...] = ()
     span: Span | None = field(default=None, compare=False)
@@ -160,9 +160,12 @@ class _Reader:
             input_spans=tuple(self.marked.span(each.path) for each in given),
         )
 
-    def _limits(self, at: At) -> tuple[tuple[str, int], ...]:
+    def _limits(self, at: At) -> tuple[tuple[str, int | None], ...]:
         members = _members(at, [], list(_LIMITS))
-        return tuple((_LIMITS[name], _count(each)) for name, each in sorted(members.items()))
+        return tuple(
+            (_LIMITS[name], None if name == "time" and each.value == "none" else _count(each))
+            for name, each in sorted(members.items())
+        )
 
     def _expectations(self, at: At) -> tuple[Expectation, ...]:
         return tuple(self.faults.each(_few(at.elements(), at), self._expectation))

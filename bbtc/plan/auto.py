@@ -62,7 +62,7 @@ def plan_advised(
     :func:`plan_auto`, and as that does."""
     advised = None
     if task.templates and len(task.actions) <= MANY_ACTIONS and options == DEFAULTS:
-        advised = _refined(task, target, limits, limits.nodes)
+        advised = _refined(task, target, limits, limits.nodes, options)
         if advised.tree.status in {"target-reached", "interrupted"}:
             return _told(advised, progress)
     return _told(_best(task, target, limits, options, advised), progress)
@@ -87,7 +87,7 @@ def _best(task: Task, target: Fraction, limits: Limits, options: Options, refine
         second = _policy(task, target, limits, options, plans[0])
         plans.extend([] if second is None else [second])
         if all(plan.tree.status != "interrupted" for plan in plans):
-            third = _refine(task, target, limits, min(plans, key=_rank), refined)
+            third = _refine(task, target, limits, options, min(plans, key=_rank), refined)
             plans.extend([] if third is None else [third])
     return _with_findings(min(plans, key=_rank), plans)
 
@@ -106,7 +106,9 @@ def _policy(task: Task, target: Fraction, limits: Limits, options: Options, know
     return found
 
 
-def _refine(task: Task, target: Fraction, limits: Limits, best: Plan, refined: Plan | None) -> Plan | None:
+def _refine(
+    task: Task, target: Fraction, limits: Limits, options: Options, best: Plan, refined: Plan | None
+) -> Plan | None:
     tree = best.tree
     most = limits.nodes
     if tree.status == "target-reached":
@@ -120,14 +122,14 @@ def _refine(task: Task, target: Fraction, limits: Limits, best: Plan, refined: P
     if most < 1:
         return None
     try:
-        return _refined(task, target, limits, most)
+        return _refined(task, target, limits, most, options)
     except LimitReached:  # not even the goal alone is small enough
         return None
 
 
-def _refined(task: Task, target: Fraction, limits: Limits, nodes: int) -> Plan:
+def _refined(task: Task, target: Fraction, limits: Limits, nodes: int, options: Options) -> Plan:
     few = replace(limits, nodes=nodes, states=min(limits.states, _REFINE_STATES))
-    return refine(task, target, few, _silent)
+    return refine(task, target, few, _silent, options)
 
 
 def _rank(plan: Plan) -> tuple[bool, Fraction, int, bool, Fraction]:
