@@ -17,6 +17,7 @@ from bbtc.plan.options import Options
 from bbtc.plan.result import Plan
 from bbtc.source import SourceFile
 from bbtc.syntax.reader import decode_source
+from bbtc.tree.deep import stack_room
 from bbtc.tree.nodes import Tree, walk
 from bbtc.watch import Watch, watching
 
@@ -80,7 +81,7 @@ def broken(name: str, why: str) -> Made:
 
 def _perform(job: Job, report: Report) -> Made:
     limits = Limits(**{"seconds": PLANNING_SECONDS, **dict[str, Any](job.entry.limits)})
-    with watching(limits) as (watch, watched):
+    with stack_room(), watching(limits) as (watch, watched):
         return _steps(job, report, watch, watched)
 
 

@@ -22,6 +22,7 @@ from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.files import require_writable, write, write_depfile, write_files
 from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.source import SourceFile
+from bbtc.tree.deep import stack_room
 from bbtc.watch import Watch, watching
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
         limits = Limits(**{key.removeprefix("limit_"): value for key, value in bounds.items()})
         if ctx.obj["started"] is not None:
             limits = limits.since(ctx.obj["started"])
-        with Session.begun(own_format or ctx.obj["format"], limits) as session:
+        with stack_room(), Session.begun(own_format or ctx.obj["format"], limits) as session:
             try:
                 status = function(session, **arguments)
             except BbtcError as error:

@@ -86,7 +86,7 @@ class Learner:
         self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(offers.goal), len(self.literals))
         self.owner = np.repeat(np.arange(len(offers.goal)), np.diff(offers.first))
         self.taken = np.ones(len(offers.action), dtype=np.bool_)
-        self._own: dict[int, frozenset[Literal]] = {}
+        self._own: dict[int, npt.NDArray[np.float64]] = {}
 
     def relevant(self) -> Flags:
         """The states that runs may still visit."""
@@ -160,9 +160,9 @@ class Learner:
     def _own_literals(self, action: int) -> npt.NDArray[np.float64]:
         """1 for literals that the action's precondition states: they read best."""
         if action not in self._own:
-            self._own[action] = frozenset(_stated(self.task.actions[action].precondition))
-        own = self._own[action]
-        return np.array([float(literal in own) for literal in self.literals])
+            own = frozenset(_stated(self.task.actions[action].precondition))
+            self._own[action] = np.array([float(literal in own) for literal in self.literals])
+        return self._own[action]
 
 
 def _literals(values: npt.NDArray[np.uint8]) -> list[Literal]:
