@@ -143,13 +143,19 @@ def _rank(plan: Plan) -> tuple[bool, Fraction, int, bool, Fraction]:
 def _with_findings(kept: Plan, plans: list[Plan]) -> Plan:
     """The plan with what the others brought to light: bounds, and what stopped them."""
     tree = kept.tree
+    interrupted = any(plan.tree.status == "interrupted" for plan in plans)
+    if interrupted and tree.status != "target-reached":
+        tree = replace(tree, status="interrupted")
+        kept = replace(kept, tree=tree)
     known = [plan.tree.bounds for plan in plans if plan.tree.bounds is not None]
     if not known:
         return kept
     lower = max(tree.success_probability, *(bounds[0] for bounds in known))
     upper = max(lower, min(bounds[1] for bounds in known))
     status = tree.status
-    if status == "stuck":
-        status = "out-of-reach" if upper < tree.target else "limit-reached"
+    if status in {"stuck", "limit-reached"} and upper < tree.target:
+        status = "out-of-reach"
+    elif status == "stuck":
+        status = "limit-reached"
     stop = kept.stop or next((plan.stop for plan in plans if plan.stop is not None), None)
     return replace(kept, tree=replace(tree, bounds=(lower, upper), status=status), stop=stop)

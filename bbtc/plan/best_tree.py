@@ -31,17 +31,16 @@ class BestTree:
     task: Task
     target: Fraction
     outer: BestTree | None = None
-    _kept: _Kept | None = None
     initial: Fraction = Fraction(0)
     """The success probability before anything is done."""
+    _kept: _Kept | None = None
 
     @classmethod
     def start(cls, task: Task, target: Fraction, outer: BestTree | None, root: Node, limits: Limits) -> BestTree:
         """To begin with: a tree of which every planner knows that it can be made. Raises
         :class:`bbtc.diagnostics.LimitReached` if it cannot even be simulated."""
         chain = explore(task, root, limits)
-        found = cls(task, target, outer)
-        found.initial = success_of(chain)
+        found = cls(task, target, outer, success_of(chain))
         found.offer(root, chain, found.initial)
         return found
 

@@ -155,9 +155,8 @@ def refine(
     refinements: list[Refinement] = []
     status: PlanStatus = "stuck"
     stop: Diagnostic | None = None
+    kept = BestTree.start(task, target, options.best, freeze(refiner.draft, limits).root, limits)
     best = base = current = refiner.simulate()  # the base: where progress was last made
-    kept = BestTree(task, target, options.best, initial=current.success)
-    kept.take(current.root, current.chain, current.success, ())
     since_base: list[_Change] = []
 
     def tell(refinement: Refinement) -> None:
