@@ -274,12 +274,13 @@ def plan_task(
     progress: Progress,
     *,
     options: Options = DEFAULTS,
-    last_steps: Callable[[], None] = lambda: None,
+    search_begins: Callable[[], None] = lambda: None,
+    search_ends: Callable[[], None] = lambda: None,
 ) -> Plan:
     """Plan a tree; ``target`` None stands for the task's own goal probability. Where the tree falls
     short of it, the plan tells what any policy could reach. A limit or an interruption
-    (``KeyboardInterrupt``) ends the search with the best tree so far; ``last_steps`` is called once it is over,
-    and what is done after that takes no longer than what was done before for this tree.
+    (``KeyboardInterrupt``) ends the search with the best tree so far, from ``search_begins`` to ``search_ends``, which
+    are called then; what is done after that takes no longer than what was done before for this tree.
 
     The tree is checked against the soundness invariants before it is returned; a violation is a
     bug and raises ``AssertionError``. Raises :class:`bbtc.diagnostics.LimitReached` where the
@@ -297,18 +298,19 @@ def plan_task(
     searching = limits.but_for(_LAST_STEPS)
     plan: Plan | None = None
     try:
+        search_begins()
         plan = run_strategy(
             strategy, task, wanted, limits=searching, progress=progress, options=replace(options, best=best)
         )
         plan = judged(plan, searching, options)
-        last_steps()
+        search_ends()
     except LimitReached as reached:
-        last_steps()
+        search_ends()
         if plan is None and best.empty:
             raise
         plan = plan or best.plan("limit-reached", reached.diagnostics[0])
     except KeyboardInterrupt:
-        last_steps()
+        search_ends()
         plan = plan or best.plan("interrupted")
     check_tree(plan.tree)
     broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))

@@ -56,13 +56,13 @@ class Watch:
         limits = self.limits
         if limits is None or time.monotonic() < self._again:
             return
-        if limits.met and not _importing(frame):
+        if limits.met and not importing(frame):
             self._again = time.monotonic() + max(_LEAST_OVERTIME, _OVERTIME * (limits.seconds or 0.0))
             replace(limits, watcher=None).check_time(self._doing)
 
 
-def _importing(frame: FrameType | None) -> bool:
-    """A module that is left half imported may never be imported again."""
+def importing(frame: FrameType | None) -> bool:
+    """Is a module being imported? One that is left half imported may never be imported again."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True

@@ -119,7 +119,7 @@ def _plan(job: Job, report: Report, limits: Limits, watch: Watch) -> Plan:
     task = pipeline.task_of_sources(sources, report, limits)
     options = Options(max_actions=entry.max_actions, retries=entry.retries, guarded=entry.guarded)
     plan = pipeline.plan_task(
-        task, entry.target, entry.strategy, limits, lambda _: None, options=options, last_steps=watch.off
+        task, entry.target, entry.strategy, limits, lambda _: None, options=options, search_ends=watch.off
     )
     if plan.tree.status == "interrupted":
         raise KeyboardInterrupt

@@ -87,8 +87,8 @@ def command(
         session.write(output, artefact, check=check, depfile=depfile)
         return 0
     limits = session.watch_planning()
+    task = task_of(session, sources, limits)
     with best_tree_on_signals() as signals:
-        task = task_of(session, sources, limits)
         tree = run_planner(session, task, target, strategy, limits, quiet=True, signals=signals).tree
         if verified:
             signals.end_at_once()

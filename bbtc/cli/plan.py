@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from types import FrameType
 from typing import TYPE_CHECKING
 
 import click
@@ -26,6 +28,7 @@ from bbtc.cli.verify import require_verified
 from bbtc.diagnostics import LimitReached
 from bbtc.files import write
 from bbtc.plan.strategies import DEFAULT
+from bbtc.watch import importing
 
 if TYPE_CHECKING:
     from bbtc.ground.task import Task
@@ -129,7 +132,8 @@ def _print_bounds(
     from bbtc.cli.bounds_report import bounds_json, bounds_report
     from bbtc.plan.bounds import task_value
 
-    with best_tree_on_signals():
+    with best_tree_on_signals() as signals:
+        signals.listen()
         value = task_value(task, session.limits, options, costs=True)
     session.clear()
     text = bounds_json(value, target) if as_json else bounds_report(task, value, target)
@@ -174,11 +178,20 @@ def run_planner(
         wanted = task.goal_probability if target is None else target
         session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
 
-    def last_steps() -> None:
+    def search_ends() -> None:
         signals.hold()
         session.watch.off()
 
-    plan = plan_task(task, target, strategy, limits, tell, options=options, last_steps=last_steps)
+    plan = plan_task(
+        task,
+        target,
+        strategy,
+        limits,
+        tell,
+        options=options,
+        search_begins=signals.listen,
+        search_ends=search_ends,
+    )
     if plan.tree.status == "stuck":
         session.report.warning(
             "BBT0502",
@@ -203,7 +216,12 @@ class Signals:
     the third one, for people without patience, ends the program without it."""
 
     came: int = 0
+    listening: bool = False
     held: bool = False
+
+    def listen(self) -> None:
+        """From now on there is a search that can be ended."""
+        self.listening = True
 
     def hold(self) -> None:
         """The search is over, and what is left is to write the tree: do not disturb."""
@@ -211,15 +229,20 @@ class Signals:
 
     def end_at_once(self) -> None:
         """From now on a signal ends the program."""
-        self.held, self.came = False, 0
+        self.listening, self.held, self.came = True, False, 0
 
-    def stop(self, _number: int, _frame: object) -> None:
+    def stop(self, number: int, frame: FrameType | None) -> None:
         """The handler."""
+        if not self.held and (not self.listening or importing(frame)):
+            # Too early, in a moment it will do.
+            threading.Timer(_MOMENT, os.kill, (os.getpid(), number)).start()
+            return
         self.came += 1
         if self.came >= _IMPATIENT or (self.came == 1 and not self.held):
             raise KeyboardInterrupt
 
 
+_MOMENT = 0.05  # seconds
 _IMPATIENT = 3
 
 

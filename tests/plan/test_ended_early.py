@@ -132,7 +132,7 @@ def endless(tmp_path: Path) -> list[str]:
 def started(*arguments: str) -> subprocess.Popen[str]:
     """The program, planning: it has told what it plans for."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "bbtc", *arguments], stderr=subprocess.PIPE, text=True, cwd=REPOSITORY
+        [sys.executable, "-m", "bbtc.cli.main", *arguments], stderr=subprocess.PIPE, text=True, cwd=REPOSITORY
     )
     assert process.stderr is not None
     assert "goal" in process.stderr.readline()
@@ -165,7 +165,7 @@ def test_more_signals_do_not_keep_the_tree_from_being_written(endless: list[str]
 def test_a_time_limit_ends_the_program_with_a_tree(endless: list[str]) -> None:
     started_at = time.monotonic()
     done = subprocess.run(
-        [sys.executable, "-m", "bbtc", *endless, "-q", "--time-limit", "3", "--strategy", "refine"],
+        [sys.executable, "-m", "bbtc.cli.main", *endless, "-q", "--time-limit", "3", "--strategy", "refine"],
         capture_output=True, text=True, check=False, cwd=REPOSITORY, timeout=300,
     )  # fmt: skip
     assert done.returncode == 3, done.stderr
