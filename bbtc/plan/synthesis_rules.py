@@ -124,8 +124,10 @@ class Learner:
             able = np.zeros(len(self.offers.goal), dtype=np.bool_)
             able[self.owner[offers[self.offers.action[offers] == action]]] = True
             wanted, others = waiting[able[waiting]], np.concatenate([waiting[~able[waiting]], against])
-            if best is not None and len(wanted) / 1.0 < -best[0][0]:
-                continue  # even without any test it would not decide more for its size
+            # At best it decides all of them: with one test, or without any if there is nothing to tell apart.
+            at_best = (-len(wanted) / 3, 1) if len(others) else (-float(len(wanted)), 0)
+            if best is not None and best[0] <= at_best:
+                continue
             columns, covered = self._grow(action, wanted, others)
             size = len(columns) + 2 if columns else 1
             key = (-len(covered) / size, len(columns))
