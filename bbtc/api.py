@@ -116,7 +116,8 @@ def plan(
 ) -> Plan:
     """Plan a tree that reaches the goal with the target probability (default: the problem's own).
 
-    Without ``limits``, planning takes a minute at most. ``strategy`` is ``advised`` (the default), ``auto``, ``search``, ``policy`` or ``refine``;
+    Without ``limits``, planning takes a minute at most. ``strategy`` is ``advised`` (the default),
+    ``auto``, ``search``, ``policy`` or ``refine``;
     ``max_actions`` bounds the actions of every run; ``guarded`` trees check preconditions and the goal in
     worlds that others change, too; ``progress`` is told each refinement as it is made.
     The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
@@ -142,7 +143,8 @@ def bounds(
     report: Report | None = None,
 ) -> TaskValue:
     """The best probability that any policy can reach, between an upper and a lower bound; with
-    ``costs``, the least expected cost of reaching it so often, too. Limits are as of :func:`plan`, and it raises as :func:`plan` does."""
+    ``costs``, the least expected cost of reaching it so often, too. Limits are as of :func:`plan`, and it
+    raises as that does."""
     from bbtc.plan.bounds import task_value
     from bbtc.plan.options import Options
 

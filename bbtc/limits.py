@@ -31,9 +31,9 @@ PLANNING_SECONDS = 60.0
 class Limits:
     """Bounds for one run; ``None`` means no bound.
 
-    ``seconds`` counts from the moment the object is made; those of a command count from the start of its process. ``states`` bounds the physical states
-    of one simulation, ``nodes`` the nodes of a tree. Of reading, ``file_bytes`` bounds the size of
-    a file, and ``depth`` how deep its parentheses are nested. Of grounding, ``actions`` bounds the ground
+    ``seconds`` counts from the moment the object is made; those of a command count from the start of its
+    process. ``states`` bounds the physical states of one simulation, ``nodes`` the nodes of a tree. Of
+    reading, ``file_bytes`` bounds the size of a file, and ``depth`` how deep its parentheses are nested. Of grounding, ``actions`` bounds the ground
     actions and templates, ``facts`` everything that the reachability analysis derives,
     ``bindings`` the objects that quantifiers are tried with, ``initial_states`` what a draw in
     ``:init`` is spelled out into. ``memory`` bounds the bytes that this process may take (its resident
@@ -84,7 +84,7 @@ class Limits:
         return replace(self, until=until if self.until is None else min(until, self.until))
 
     def but_for(self, share: float) -> Limits:
-        """The same limits for a part of the work that leaves a share of the whole time to what comes after it."""
+        """The same limits for a part of the work that leaves a share of the whole time to what comes next."""
         if self.seconds is None:
             return self
         until = self._start + (1 - share) * self.seconds

@@ -279,7 +279,8 @@ def plan_task(
 ) -> Plan:
     """Plan a tree; ``target`` None stands for the task's own goal probability. Where the tree falls
     short of it, the plan tells what any policy could reach. A limit or an interruption
-    (``KeyboardInterrupt``) ends the search with the best tree so far, from ``search_begins`` to ``search_ends``, which
+    (``KeyboardInterrupt``) ends the search with the best tree so far, from ``search_begins`` to
+    ``search_ends``, which
     are called then; what is done after that takes no longer than what was done before for this tree.
 
     The tree is checked against the soundness invariants before it is returned; a violation is a

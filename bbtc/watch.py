@@ -1,8 +1,8 @@
-"""A watch over limits that needs nobody's help: it looks at the clock and at the memory whatever is being done.
+"""A watch over limits that needs nobody's help: it looks at clock and memory whatever is being done.
 
-Long computations look at their limits themselves (:meth:`bbtc.limits.Limits.check_time`). What does not, because it
-is short for all inputs but the largest, is ended by a timer of the operating system: its signal interrupts
-Python code, and reading and writing, as Ctrl-C does. Only calls into libraries written in C are waited for.
+Long computations look at their limits themselves (:meth:`bbtc.limits.Limits.check_time`). What does not,
+because it is short for all inputs but the largest, is ended by a timer of the operating system: its signal
+interrupts Python code, and reading and writing, as Ctrl-C does. Only calls into libraries written in C are waited for.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ _OVERTIME = 0.1  # of the time limit
 
 @dataclass(slots=True)
 class Watch:
-    """The limits being watched; None while nothing is. Once one is met, what is being done has some seconds to end
-    by itself until it is interrupted again."""
+    """The limits being watched; None while nothing is. Once one is met, what is being done has some seconds
+    to end by itself until it is interrupted again."""
 
     limits: Limits | None = None
     _doing: str = "reading the input"
@@ -72,9 +72,9 @@ def importing(frame: FrameType | None) -> bool:
 
 @contextlib.contextmanager
 def watching(limits: Limits) -> Iterator[tuple[Watch, Limits]]:
-    """Watch over limits for as long as the context lasts: a :class:`bbtc.diagnostics.LimitReached` may be raised
-    anywhere in it. The watch, and the limits to work with. Outside the main thread, and on systems without such
-    timers, nothing is watched."""
+    """Watch over limits for as long as the context lasts: a :class:`bbtc.diagnostics.LimitReached` may be
+    raised anywhere in it. The watch, and the limits to work with. Outside the main thread, and on systems
+    without such timers, nothing is watched."""
     watch = Watch()
     told = watch.over(limits)
     bounded = limits.seconds is not None or limits.memory is not None
@@ -93,8 +93,8 @@ def watching(limits: Limits) -> Iterator[tuple[Watch, Limits]]:
 
 
 def process_started() -> float:
-    """The moment (of ``time.monotonic``) at which this process was started, as far as the system tells it; else
-    now."""
+    """The moment (of ``time.monotonic``) at which this process was started, as far as the system tells it;
+    else now."""
     now = time.monotonic()
     try:
         # After the name, which may hold anything: field 22, in ticks since the machine was started.
@@ -102,4 +102,4 @@ def process_started() -> float:
         running = time.clock_gettime(time.CLOCK_BOOTTIME) - ticks / os.sysconf("SC_CLK_TCK")
     except (OSError, ValueError, IndexError, AttributeError):
         return now
-    return now - running if 0 <= running else now
+    return now - running if running >= 0 else now

@@ -28,11 +28,24 @@ def forever() -> None:
         pass
 
 
+def dream(limits: Limits) -> None:
+    limits.tell("a dream")
+    forever()
+
+
+def hoard(kept: list[bytearray]) -> None:
+    while True:
+        kept.append(bytearray(b"1") * (1 << 20))
+        time.sleep(0.002)
+
+
 @needs_timers
 def test_what_does_not_look_at_the_clock_is_ended() -> None:
-    with watching(Limits(seconds=0.2)) as (_, limits), pytest.raises(LimitReached, match=r"0\.2 s ended a dream"):
-        limits.tell("a dream")
-        forever()
+    with (
+        watching(Limits(seconds=0.2)) as (_, limits),
+        pytest.raises(LimitReached, match=r"0\.2 s ended a dream"),
+    ):
+        dream(limits)
 
 
 @needs_timers
@@ -43,9 +56,7 @@ def test_memory_is_watched_too() -> None:
     if left is None:
         pytest.skip("the system does not tell what is taken")
     with watching(Limits(memory=-left + (50 << 20))), pytest.raises(LimitReached, match="MiB of memory"):
-        while True:
-            kept.append(bytearray(b"1") * (1 << 20))
-            time.sleep(0.002)
+        hoard(kept)
     assert len(kept) < 200
 
 
@@ -107,7 +118,9 @@ def test_the_start_of_the_process_is_known() -> None:
     """A process that slept for a second before it asked."""
     if not Path("/proc/self/stat").exists():
         pytest.skip("the system does not tell")
-    program = "import time; time.sleep(1); from bbtc.watch import process_started as s; print(time.monotonic() - s())"
+    program = (
+        "import time; time.sleep(1); from bbtc.watch import *; print(time.monotonic() - process_started())"
+    )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=REPOSITORY
     )
@@ -140,7 +153,8 @@ def test_reading_what_never_comes_ends_at_the_limit(endless_input: Path, command
 
 
 def test_the_stack_holds_as_many_frames_as_there_is_room_for() -> None:
-    """The deepest recursion allowed, of the kinds that happen: in a process of its own, which it might end."""
+    """The deepest recursion allowed, of the kinds that happen: in a process of its own, which it might
+    end."""
     program = """
 import sys
 from dataclasses import dataclass

@@ -117,7 +117,9 @@ def _circles(called: Mapping[str, list[md.BodyCall]]) -> dict[str, int]:
     names = list(called)
     number = {name: position for position, name in enumerate(names)}
     successors = [[number[call.name] for call in called[name]] for name in names]
-    return {names[each]: position for position, circle in enumerate(components(successors)) for each in circle}
+    return {
+        names[each]: position for position, circle in enumerate(components(successors)) for each in circle
+    }
 
 
 def _acting(templates: Mapping[str, md.Template]) -> set[str]:

@@ -174,14 +174,17 @@ def reached(model: md.Model) -> Reached:
 def _close(model: md.Model, result: Reached) -> None:
     """Round by round; in each, only what reads a predicate that got a new value in the one before is
     looked at."""
-    steps: list[tuple[set[str], Callable[[], None]]] = []
-    for rule in model.rules:
-        steps.append((_read_in([rule.condition]), partial(_conclude, rule, result)))
-    for schema in model.schemas.values():
-        reads = _read_in(schema_conditions(schema)) | observed(schema)
-        steps.append((reads, partial(_happen, schema, result)))
-    for sensor in model.sensors:
-        steps.append((_read_in([sensor.condition, sensor.sensed]), partial(_sense, sensor, result)))
+    steps: list[tuple[set[str], Callable[[], None]]] = [
+        *((_read_in([rule.condition]), partial(_conclude, rule, result)) for rule in model.rules),
+        *(
+            (_read_in(schema_conditions(schema)) | observed(schema), partial(_happen, schema, result))
+            for schema in model.schemas.values()
+        ),
+        *(
+            (_read_in([sensor.condition, sensor.sensed]), partial(_sense, sensor, result))
+            for sensor in model.sensors
+        ),
+    ]
     readers: dict[str, list[int]] = {}
     for number, (reads, _) in enumerate(steps):
         for name in reads:
@@ -270,21 +273,29 @@ def relevant(model: md.Model) -> tuple[set[str], set[str]]:
                 act(call.name)
     for sensor in model.sensors:
         read([sensor.condition, sensor.sensed])
-    setters: dict[str, list[str]] = {}
     for name, schema in model.schemas.items():
-        if schema.observe is not None or (
-            model.metric == "reward"
-            and any(isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect))
-        ):
+        if schema.observe is not None or (model.metric == "reward" and _rewards(schema)):
             act(name)
-        for predicate in {leaf.predicate for leaf in settings(schema.effect)}:
-            setters.setdefault(predicate, []).append(name)
-    rules: dict[str, list[md.Rule]] = {}
-    for rule in model.rules:
-        rules.setdefault(rule.predicate, []).append(rule)
+    setters, rules = _setters(model)
     while todo:
         predicate = todo.pop()
         read([rule.condition for rule in rules.get(predicate, ())])
         for name in setters.get(predicate, ()):
             act(name)
     return predicates, actions
+
+
+def _rewards(schema: md.Schema) -> bool:
+    return any(isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect))
+
+
+def _setters(model: md.Model) -> tuple[dict[str, list[str]], dict[str, list[md.Rule]]]:
+    """By predicate: the actions that set it, and the rules that derive it."""
+    setters: dict[str, list[str]] = {}
+    for name, schema in model.schemas.items():
+        for predicate in {leaf.predicate for leaf in settings(schema.effect)}:
+            setters.setdefault(predicate, []).append(name)
+    rules: dict[str, list[md.Rule]] = {}
+    for rule in model.rules:
+        rules.setdefault(rule.predicate, []).append(rule)
+    return setters, rules

@@ -16,8 +16,8 @@ MAX_DEPTH = 256
 
 
 def condition_to_json(condition: Condition, variables: Sequence[Variable]) -> list[object]:
-    """The condition as nested lists. Raises :class:`~bbtc.diagnostics.BbtcError` for one with more levels than
-    would be read."""
+    """The condition as nested lists. Raises :class:`~bbtc.diagnostics.BbtcError` for one with more levels
+    than would be read."""
     inner: list[Condition] = [condition]
     for _ in range(MAX_DEPTH + 1):
         inner = [part for each in inner if type(each) is not Is for part in _parts(each)]  # leaves have none

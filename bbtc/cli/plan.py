@@ -156,8 +156,8 @@ def run_planner(
     quiet: bool,
     signals: Signals,
 ) -> Plan:
-    """Plan, telling the session each refinement as it is made and how planning ended. Afterwards neither a limit
-    nor a signal keeps the tree from being written."""
+    """Plan, telling the session each refinement as it is made and how planning ended. Afterwards neither a
+    limit nor a signal keeps the tree from being written."""
     from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
     from bbtc.cli.wording import exact, plan_summary, refinement_line, simplified_line
     from bbtc.ground.describe import describe
@@ -212,8 +212,8 @@ def run_planner(
 
 @dataclass(slots=True)
 class Signals:
-    """What SIGINT (Ctrl-C) and SIGTERM do to planning: the first one ends the search with the best tree so far;
-    the third one, for people without patience, ends the program without it."""
+    """What SIGINT (Ctrl-C) and SIGTERM do to planning: the first one ends the search with the best tree so
+    far; the third one, for people without patience, ends the program without it."""
 
     came: int = 0
     listening: bool = False

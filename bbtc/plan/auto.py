@@ -87,7 +87,7 @@ def _best(task: Task, target: Fraction, limits: Limits, options: Options, refine
         second = _policy(task, target, limits, options, plans[0])
         plans.extend([] if second is None else [second])
         if all(plan.tree.status != "interrupted" for plan in plans):
-            third = _refine(task, target, limits, options, min(plans, key=_rank), refined)
+            third = _refine(task, limits, options, min(plans, key=_rank), refined)
             plans.extend([] if third is None else [third])
     return _with_findings(min(plans, key=_rank), plans)
 
@@ -106,10 +106,8 @@ def _policy(task: Task, target: Fraction, limits: Limits, options: Options, know
     return found
 
 
-def _refine(
-    task: Task, target: Fraction, limits: Limits, options: Options, best: Plan, refined: Plan | None
-) -> Plan | None:
-    tree = best.tree
+def _refine(task: Task, limits: Limits, options: Options, best: Plan, refined: Plan | None) -> Plan | None:
+    tree, target = best.tree, best.tree.target
     most = limits.nodes
     if tree.status == "target-reached":
         most = min(most, size(tree.root) - 1)  # a larger tree would not be kept

@@ -1,4 +1,4 @@
-"""The best tree that a planner has made so far, kept where neither a limit nor an interruption can lose it."""
+"""The best tree that a planner has made so far, kept where no limit and no interruption can lose it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ class BestTree:
     _kept: _Kept | None = None
 
     @classmethod
-    def start(cls, task: Task, target: Fraction, outer: BestTree | None, root: Node, limits: Limits) -> BestTree:
+    def start(
+        cls, task: Task, target: Fraction, outer: BestTree | None, root: Node, limits: Limits
+    ) -> BestTree:
         """To begin with: a tree of which every planner knows that it can be made. Raises
         :class:`bbtc.diagnostics.LimitReached` if it cannot even be simulated."""
         chain = explore(task, root, limits)

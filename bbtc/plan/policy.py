@@ -110,7 +110,9 @@ def plan_policy(
     by then. Only with ``whole`` it raises ``LimitReached`` instead where the task has more states than
     the limit."""
     goal: Node = numbered(ConditionNode("", task.goal))
-    search = _Search(task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole)
+    search = _Search(
+        task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole
+    )
     search.run()
     if whole and search.stop is not None:
         raise LimitReached([search.stop])

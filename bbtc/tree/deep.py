@@ -48,8 +48,8 @@ def unwind(call: Deep[T]) -> T:
 
 
 FRAME_BYTES = 1024
-"""More of the machine's stack than a frame of ours ever takes: comparing nested frozen dataclasses, the worst that
-happens, takes two thirds of it."""
+"""More of the machine's stack than a frame of ours ever takes: comparing nested frozen dataclasses, the
+worst that happens, takes two thirds of it."""
 
 _MOST_FRAMES = 20_000
 _SPARED = 1 << 20  # bytes of the stack, for what is called at its end
@@ -57,8 +57,8 @@ _SPARED = 1 << 20  # bytes of the stack, for what is called at its end
 
 @contextlib.contextmanager
 def stack_room() -> Iterator[None]:
-    """Let functions call themselves as deeply as the stack of the main thread holds, some 7000 frames where it has
-    the usual 8 MiB, for as long as the context lasts. Changes nothing in other threads, and where the
+    """Let functions call themselves as deeply as the stack of the main thread holds, some 7000 frames where
+    it has the usual 8 MiB, for as long as the context lasts. Changes nothing in other threads, and where the
     system does not tell the size of the stack."""
     before = sys.getrecursionlimit()
     sys.setrecursionlimit(max(before, min(_MOST_FRAMES, (_stack_bytes() - _SPARED) // FRAME_BYTES)))

@@ -1,9 +1,9 @@
-"""Whatever ends planning, and whenever: the best tree so far is there, it is sound, and it says what ended it."""
+"""Whatever ends planning, and whenever: the best tree so far is there, it is sound, and it says what ended
+it."""
 
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -29,8 +29,8 @@ STRATEGIES = ("auto", "search", "policy", "refine")
 NODES = 40
 """So many and no more, or refinement goes on for long."""
 
-# A robot looks for a key in one of two rooms, and its gripper may slip: every strategy has something to do, and
-# no tree reaches 1.
+# A robot looks for a key in one of two rooms, and its gripper may slip: every strategy has something to do,
+# and no tree reaches 1.
 TEXT = """
 (define (domain keys)
   (:types room)
@@ -86,7 +86,9 @@ def test_the_best_tree_survives_an_end_at_any_moment(task: Task, strategy: str, 
         KeyboardInterrupt if ended == "interrupted" else lambda: Limits.reached("it is over", "--time-limit")
     )
     for number in some(looks(task, strategy), 8):
-        plan = plan_task(task, Fraction(1), strategy, Limits(nodes=NODES, watcher=at_look(number, end)), lambda _: None)
+        plan = plan_task(
+            task, Fraction(1), strategy, Limits(nodes=NODES, watcher=at_look(number, end)), lambda _: None
+        )
         figures, _ = simulate_tree(plan.tree, Limits())
         assert figures.success == plan.tree.success_probability == plan.figures.success
         # Once it is known what any policy can reach, that is the verdict, whatever ends the rest.
@@ -98,10 +100,16 @@ def test_the_best_tree_survives_an_end_at_any_moment(task: Task, strategy: str, 
 @pytest.mark.parametrize("strategy", STRATEGIES)
 def test_what_was_found_before_the_end_is_what_is_returned(task: Task, strategy: str) -> None:
     """The later planning is ended, the better the tree: at the last look it is as good as without an end."""
-    whole = plan_task(task, Fraction(1), strategy, Limits(nodes=NODES), lambda _: None).tree.success_probability
+    whole = plan_task(
+        task, Fraction(1), strategy, Limits(nodes=NODES), lambda _: None
+    ).tree.success_probability
     last = looks(task, strategy)
     plan = plan_task(
-        task, Fraction(1), strategy, Limits(nodes=NODES, watcher=at_look(last, KeyboardInterrupt)), lambda _: None
+        task,
+        Fraction(1),
+        strategy,
+        Limits(nodes=NODES, watcher=at_look(last, KeyboardInterrupt)),
+        lambda _: None,
     )
     assert plan.tree.success_probability == whole > 0
 
@@ -141,7 +149,9 @@ def started(*arguments: str) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize("strategy", ["search", "policy", "refine"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_the_program_with_a_tree(endless: list[str], strategy: str, number: signal.Signals) -> None:
+def test_a_signal_ends_the_program_with_a_tree(
+    endless: list[str], strategy: str, number: signal.Signals
+) -> None:
     for seconds in (0.0, 1.0) if not LONG else [each / 4 for each in range(24)]:
         process = started(*endless, "--strategy", strategy)
         time.sleep(seconds)
@@ -150,7 +160,7 @@ def test_a_signal_ends_the_program_with_a_tree(endless: list[str], strategy: str
         assert process.returncode == 130, told
         tree = bbtc.load_tree(endless[-1])
         assert tree.status == "interrupted"
-        os.unlink(endless[-1])
+        Path(endless[-1]).unlink()
 
 
 def test_more_signals_do_not_keep_the_tree_from_being_written(endless: list[str]) -> None:
