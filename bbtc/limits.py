@@ -33,11 +33,11 @@ class Limits:
 
     ``seconds`` counts from the moment the object is made; those of a command count from the start of its
     process. ``states`` bounds the physical states of one simulation, ``nodes`` the nodes of a tree. Of
-    reading, ``file_bytes`` bounds the size of a file, and ``depth`` how deep its parentheses are nested. Of grounding, ``actions`` bounds the ground
-    actions and templates, ``facts`` everything that the reachability analysis derives,
-    ``bindings`` the objects that quantifiers are tried with, ``initial_states`` what a draw in
-    ``:init`` is spelled out into. ``memory`` bounds the bytes that this process may take (its resident
-    set), and those of the engine that grounding runs beside it.
+    reading, ``file_bytes`` bounds the size of a file, and ``depth`` how deep its parentheses are nested. Of
+    grounding, ``actions`` bounds the ground actions and templates, ``facts`` everything that the
+    reachability analysis derives, ``bindings`` the objects that quantifiers are tried with,
+    ``initial_states`` what a draw in ``:init`` is spelled out into. ``memory`` bounds the bytes that this
+    process may take (its resident set), and those of the engine that grounding runs beside it.
 
     ``watcher`` is told what is being done whenever time is looked at. ``until`` is the moment (of
     ``time.monotonic``) at which a part of the work has to end.

@@ -2,7 +2,8 @@
 
 Long computations look at their limits themselves (:meth:`bbtc.limits.Limits.check_time`). What does not,
 because it is short for all inputs but the largest, is ended by a timer of the operating system: its signal
-interrupts Python code, and reading and writing, as Ctrl-C does. Only calls into libraries written in C are waited for.
+interrupts Python code, and reading and writing, as Ctrl-C does. Only calls into libraries written in C are
+waited for.
 """
 
 from __future__ import annotations
