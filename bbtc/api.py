@@ -15,7 +15,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, TypeAlias
 
 from bbtc.diagnostics import Diagnostic, Report
-from bbtc.limits import Limits
+from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.source import Reading, SourceFile
 
 if TYPE_CHECKING:
@@ -130,7 +130,8 @@ def plan(
 ) -> Plan:
     """Plan a tree that reaches the goal with the target probability (default: the problem's own).
 
-    ``strategy`` is ``advised`` (the default), ``auto``, ``search``, ``policy`` or ``refine``;
+    Without ``limits``, planning takes a minute at most. ``strategy`` is ``advised`` (the default),
+    ``auto``, ``search``, ``policy`` or ``refine``;
     ``max_actions`` bounds the actions of every run; ``guarded`` trees check preconditions and the goal in
     worlds that others change, too; ``problem`` and ``lenient`` as in :func:`load`; ``progress`` is told
     each refinement as it is made.
@@ -142,7 +143,7 @@ def plan(
     from bbtc.plan.options import Options
     from bbtc.plan.strategies import DEFAULT
 
-    limits = limits or Limits()
+    limits = limits or Limits(seconds=PLANNING_SECONDS)
     options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
     tell = progress or (lambda _: None)
     task = _task(inputs, limits, report, Reading(problem, lenient))
@@ -159,11 +160,12 @@ def bounds(
     report: Report | None = None,
 ) -> TaskValue:
     """The best probability that any policy can reach, between an upper and a lower bound; with
-    ``costs``, the least expected cost of reaching it so often, too. Raises as :func:`plan` does."""
+    ``costs``, the least expected cost of reaching it so often, too. Limits are as of :func:`plan`, and it
+    raises as that does."""
     from bbtc.plan.bounds import task_value
     from bbtc.plan.options import Options
 
-    limits = limits or Limits()
+    limits = limits or Limits(seconds=PLANNING_SECONDS)
     task = _task(inputs, limits, report, Reading(problem, lenient))
     return task_value(task, limits, Options(max_actions=max_actions), costs=costs)
 

@@ -90,6 +90,7 @@ CODES: dict[str, str] = {
     "BBT0501": "unknown strategy",
     "BBT0502": "nothing left to insert before the target",
     "BBT0503": "option that the strategy does not know",
+    "BBT0504": "a tree would have more levels than one may have",
     # 06xx: artefacts, and the shape of trees
     "BBT0601": "artefact is not valid JSON",
     "BBT0602": "artefact of another format or version",

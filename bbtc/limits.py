@@ -23,18 +23,21 @@ class Stage:
 
 Watcher: TypeAlias = Callable[[Stage], None]
 
+PLANNING_SECONDS = 60.0
+"""The time that planning may take unless somebody says otherwise."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Bounds for one run; ``None`` means no bound.
 
-    ``seconds`` counts from the moment the object is made. ``states`` bounds the physical states
-    of one simulation, ``nodes`` the nodes of a tree. Of reading, ``file_bytes`` bounds the size of
-    a file, and ``depth`` how deep its parentheses are nested. Of grounding, ``actions`` bounds the ground
-    actions and templates, ``facts`` everything that the reachability analysis derives,
-    ``bindings`` the objects that quantifiers are tried with, ``initial_states`` what a draw in
-    ``:init`` is spelled out into. ``memory`` bounds the bytes that this process may take (its resident
-    set), and those of the engine that grounding runs beside it.
+    ``seconds`` counts from the moment the object is made; those of a command count from the start of its
+    process. ``states`` bounds the physical states of one simulation, ``nodes`` the nodes of a tree. Of
+    reading, ``file_bytes`` bounds the size of a file, and ``depth`` how deep its parentheses are nested. Of
+    grounding, ``actions`` bounds the ground actions and templates, ``facts`` everything that the
+    reachability analysis derives, ``bindings`` the objects that quantifiers are tried with,
+    ``initial_states`` what a draw in ``:init`` is spelled out into. ``memory`` bounds the bytes that this
+    process may take (its resident set), and those of the engine that grounding runs beside it.
 
     ``watcher`` is told what is being done whenever time is looked at. ``until`` is the moment (of
     ``time.monotonic``) at which a part of the work has to end.
@@ -58,6 +61,10 @@ class Limits:
         """The same bounds, with the time counted from now."""
         return replace(self, _start=time.monotonic())
 
+    def since(self, start: float) -> Limits:
+        """The same bounds, with the time counted from a moment of ``time.monotonic``."""
+        return replace(self, _start=start)
+
     @property
     def remaining(self) -> float | None:
         """Seconds left, not below 0; None without a bound."""
@@ -75,6 +82,23 @@ class Limits:
         """The same limits for a part of the work that must end after so many seconds at the latest."""
         until = time.monotonic() + seconds
         return replace(self, until=until if self.until is None else min(until, self.until))
+
+    def but_for(self, share: float) -> Limits:
+        """The same limits for a part of the work that leaves a share of the whole time to what comes next."""
+        if self.seconds is None:
+            return self
+        until = self._start + (1 - share) * self.seconds
+        return replace(self, until=until if self.until is None else min(until, self.until))
+
+    def overtime(self, seconds: float) -> Limits:
+        """The same limits for what comes after the end of the time: it has so many seconds more."""
+        return replace(self, seconds=None, until=time.monotonic() + seconds)
+
+    @property
+    def met(self) -> bool:
+        """Is the time over, or the memory used up?"""
+        left = self.memory_left
+        return self.remaining == 0 or (left is not None and left < 0)
 
     def tell(self, doing: str, states: int | None = None, bounds: tuple[float, float] | None = None) -> None:
         """Tell the watcher, if there is one, what is being done."""

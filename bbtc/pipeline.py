@@ -5,12 +5,12 @@ Each stage is imported where it runs: who checks a file needs no planner in memo
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from bbtc.diagnostics import BbtcError, Diagnostic, Related, Report, Severity
+from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Report, Severity
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 
 _MOST_LISTED = 8  # problems that a hint names
+_LAST_STEPS = 0.04
+"""Of the time for planning, what is left for the steps that make a tree of what was found."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +49,13 @@ def parse_all(
     """The syntax tree of every file; syntax errors of all of them go to the report."""
     from bbtc.syntax.parser import parse
 
-    depth = (limits or Limits()).depth
-    return tuple(parse(source, report, depth) for source in sources)
+    limits = limits or Limits()
+    documents = []
+    for source in sources:
+        limits.check_time("reading")
+        documents.append(parse(source, report, limits.depth))
+    limits.check_time("reading")
+    return tuple(documents)
 
 
 def select(documents: Sequence[Document], report: Report, reading: Reading = AS_WRITTEN) -> Inputs | None:
@@ -202,17 +209,20 @@ def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definitio
     return next(iter(domains.values())) if len(domains) == 1 else None
 
 
-def format_source(source: SourceFile) -> str:
-    """The text in canonical layout. Raises :class:`BbtcError` for syntax errors."""
+def format_source(source: SourceFile, limits: Limits | None = None) -> str:
+    """The text in canonical layout. Raises :class:`BbtcError` for syntax errors, or ``LimitReached``."""
     from bbtc.syntax.parser import parse
     from bbtc.syntax.printer import print_document
 
+    limits = limits or Limits()
     report = Report()
-    document = parse(source, report)
+    limits.check_time("reading")
+    document = parse(source, report, limits.depth)
     report.raise_errors()
+    limits.check_time("the layout")
     text = print_document(document)
     # The layout must never change what a file says: a bug here must not cost anybody a domain.
-    again = parse(SourceFile(source.name, text), report)
+    again = parse(SourceFile(source.name, text), report, limits.depth)
     if again.definitions != document.definitions or len(again.comments) != len(document.comments):
         raise AssertionError(f"the layout of {source.name} would change its meaning")
     return text
@@ -359,9 +369,14 @@ def plan_task(
     progress: Progress,
     *,
     options: Options = DEFAULTS,
+    search_begins: Callable[[], None] = lambda: None,
+    search_ends: Callable[[], None] = lambda: None,
 ) -> Plan:
     """Plan a tree; ``target`` None stands for the task's own goal probability. Where the tree falls
-    short of it, the plan tells what any policy could reach.
+    short of it, the plan tells what any policy could reach. A limit or an interruption
+    (``KeyboardInterrupt``) ends the search with the best tree so far, from ``search_begins`` to
+    ``search_ends``, which
+    are called then; what is done after that takes no longer than what was done before for this tree.
 
     The tree is checked against the soundness invariants before it is returned; a violation is a
     bug and raises ``AssertionError``. Raises :class:`bbtc.diagnostics.LimitReached` where the
@@ -369,18 +384,35 @@ def plan_task(
     """
     from bbtc.belief.chain import explore
     from bbtc.belief.soundness import violations
+    from bbtc.plan.best_tree import BestTree
     from bbtc.plan.bounds import judged
     from bbtc.plan.strategies import run_strategy
     from bbtc.tree.validate import check_tree
 
     wanted = task.goal_probability if target is None else target
-    plan = run_strategy(strategy, task, wanted, limits=limits, progress=progress, options=options)
-    plan = judged(plan, limits, options)
+    best = BestTree(task, wanted)
+    searching = limits.but_for(_LAST_STEPS)
+    plan: Plan | None = None
+    try:
+        search_begins()
+        plan = run_strategy(
+            strategy, task, wanted, limits=searching, progress=progress, options=replace(options, best=best)
+        )
+        plan = judged(plan, searching, options)
+        search_ends()
+    except LimitReached as reached:
+        search_ends()
+        if plan is None and best.empty:
+            raise
+        plan = plan or best.plan("limit-reached", reached.diagnostics[0])
+    except KeyboardInterrupt:
+        search_ends()
+        plan = plan or best.plan("interrupted")
     check_tree(plan.tree)
-    broken = violations(task, explore(task, plan.tree.root, Limits(states=limits.states)))
+    broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:
         raise AssertionError(f"unsound tree: {'; '.join(broken)}")
-    return plan
+    return replace(plan, chain=None)
 
 
 def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:

@@ -9,6 +9,7 @@ from typing_extensions import assert_never
 from bbtc.analysis.formulas import effect, formula, inner_scope
 from bbtc.analysis.names import Names, Scope
 from bbtc.diagnostics import Related, Report
+from bbtc.graph import components
 from bbtc.model import domain as md
 from bbtc.model import formula as mf
 from bbtc.syntax import ast
@@ -95,10 +96,11 @@ def check_templates(report: Report, templates: Mapping[str, md.Template]) -> Non
         name: [call for call in calls(each.body) if call.kind == "template" and call.name in templates]
         for name, each in templates.items()
     }
+    round_about = _circles(called)
     acting = _acting(templates)
     for name, each in templates.items():
         for call in called[name]:
-            if name in _reachable(call.name, called):
+            if call.name == name or round_about[call.name] == round_about[name]:
                 way = "itself" if call.name == name else f"itself through `{call.name}`"
                 report.error(
                     "BBT0215",
@@ -110,29 +112,32 @@ def check_templates(report: Report, templates: Mapping[str, md.Template]) -> Non
         _check_skippers(report, each.body, acting)
 
 
-def _reachable(start: str, called: Mapping[str, list[md.BodyCall]]) -> set[str]:
-    seen = {start}
-    todo = [start]
-    while todo:
-        for call in called[todo.pop()]:
-            if call.name not in seen:
-                seen.add(call.name)
-                todo.append(call.name)
-    return seen
+def _circles(called: Mapping[str, list[md.BodyCall]]) -> dict[str, int]:
+    """A number for each template, the same for those that call one another in a circle."""
+    names = list(called)
+    number = {name: position for position, name in enumerate(names)}
+    successors = [[number[call.name] for call in called[name]] for name in names]
+    return {
+        names[each]: position for position, circle in enumerate(components(successors)) for each in circle
+    }
 
 
 def _acting(templates: Mapping[str, md.Template]) -> set[str]:
     """Names of the templates that contain an action, through others as well."""
+    callers: dict[str, list[str]] = {}
+    todo: list[str] = []
+    for name, each in templates.items():
+        for call in calls(each.body):
+            if call.kind == "action":
+                todo.append(name)
+            else:
+                callers.setdefault(call.name, []).append(name)
     acting: set[str] = set()
-    grown = True
-    while grown:
-        grown = False
-        for name, each in templates.items():
-            if name not in acting and any(
-                call.kind == "action" or call.name in acting for call in calls(each.body)
-            ):
-                acting.add(name)
-                grown = True
+    while todo:
+        name = todo.pop()
+        if name not in acting:
+            acting.add(name)
+            todo.extend(callers.get(name, ()))
     return acting
 
 

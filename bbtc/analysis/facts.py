@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
 
 from typing_extensions import assert_never
 
@@ -190,23 +192,53 @@ def reached(model: md.Model) -> Reached:
 
 
 def _close(model: md.Model, result: Reached) -> None:
-    grown = True
-    while grown:
-        before = len(result.values) + len(result.actions)
-        for rule in model.rules:
-            if result.possible(rule.condition):
-                result.values[rule.predicate, Truth.TRUE] = None
-            if any((name, Truth.UNKNOWN) in result.values for name in plain(rule.condition)):
-                result.values[rule.predicate, Truth.UNKNOWN] = None
-        for schema in model.schemas.values():
-            if schema.name in result.actions or result.possible(schema.precondition):
-                result.actions[schema.name] = None
-                _apply(schema.effect, result)
-                _tell(observed(schema), result)
-        for sensor in model.sensors:
-            if result.possible(sensor.condition):
-                _tell({atom.predicate for atom in mf.atoms(sensor.sensed)}, result)
-        grown = len(result.values) + len(result.actions) > before
+    """Round by round; in each, only what reads a predicate that got a new value in the one before is
+    looked at."""
+    steps: list[tuple[set[str], Callable[[], None]]] = [
+        *((_read_in([rule.condition]), partial(_conclude, rule, result)) for rule in model.rules),
+        *(
+            (_read_in(schema_conditions(schema)) | observed(schema), partial(_happen, schema, result))
+            for schema in model.schemas.values()
+        ),
+        *(
+            (_read_in([sensor.condition, sensor.sensed]), partial(_sense, sensor, result))
+            for sensor in model.sensors
+        ),
+    ]
+    readers: dict[str, list[int]] = {}
+    for number, (reads, _) in enumerate(steps):
+        for name in reads:
+            readers.setdefault(name, []).append(number)
+    due: Iterable[int] = range(len(steps))
+    while due:
+        before = len(result.values)
+        for number in due:
+            steps[number][1]()
+        fresh = {name for name, _ in islice(result.values, before, None)}
+        due = sorted({number for name in fresh for number in readers.get(name, ())})
+
+
+def _read_in(formulas: Iterable[mf.Formula]) -> set[str]:
+    return {atom.predicate for formula in formulas for atom in mf.atoms(formula)}
+
+
+def _conclude(rule: md.Rule, result: Reached) -> None:
+    if result.possible(rule.condition):
+        result.values[rule.predicate, Truth.TRUE] = None
+    if any((name, Truth.UNKNOWN) in result.values for name in plain(rule.condition)):
+        result.values[rule.predicate, Truth.UNKNOWN] = None
+
+
+def _happen(schema: md.Schema, result: Reached) -> None:
+    if schema.name in result.actions or result.possible(schema.precondition):
+        result.actions[schema.name] = None
+        _apply(schema.effect, result)
+        _tell(observed(schema), result)
+
+
+def _sense(sensor: md.Sensor, result: Reached) -> None:
+    if result.possible(sensor.condition):
+        _tell({atom.predicate for atom in mf.atoms(sensor.sensed)}, result)
 
 
 def _tell(predicates: set[str], result: Reached) -> None:
@@ -241,33 +273,51 @@ def relevant(model: md.Model) -> tuple[set[str], set[str]]:
     """Predicates and actions that can matter to the goal, to a reward metric or to a template."""
     predicates: set[str] = set()
     actions: set[str] = set()
+    todo: list[str] = []
 
     def read(formulas: Iterable[mf.Formula]) -> None:
-        predicates.update(atom.predicate for formula in formulas for atom in mf.atoms(formula))
+        fresh = _read_in(formulas) - predicates
+        predicates.update(fresh)
+        todo.extend(fresh)
+
+    def act(name: str) -> None:
+        if name not in actions:
+            actions.add(name)
+            if name in model.schemas:
+                read(schema_conditions(model.schemas[name]))
 
     if model.goal is not None:
         read([model.goal])
     for template in model.templates.values():
         read(template_conditions(template))
-        actions.update(call.name for call in calls(template.body) if call.kind == "action")
-    size = -1
-    while size != len(predicates) + len(actions):
-        size = len(predicates) + len(actions)
-        for rule in model.rules:
-            if rule.predicate in predicates:
-                read([rule.condition])
-        for sensor in model.sensors:
-            read([sensor.condition, sensor.sensed])
-        for name, schema in model.schemas.items():
-            rewarding = model.metric == "reward" and any(
-                isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect)
-            )
-            if (
-                name in actions
-                or rewarding
-                or schema.observe is not None
-                or any(leaf.predicate in predicates for leaf in settings(schema.effect))
-            ):
-                actions.add(name)
-                read(schema_conditions(schema))
+        for call in calls(template.body):
+            if call.kind == "action":
+                act(call.name)
+    for sensor in model.sensors:
+        read([sensor.condition, sensor.sensed])
+    for name, schema in model.schemas.items():
+        if schema.observe is not None or (model.metric == "reward" and _rewards(schema)):
+            act(name)
+    setters, rules = _setters(model)
+    while todo:
+        predicate = todo.pop()
+        read([rule.condition for rule in rules.get(predicate, ())])
+        for name in setters.get(predicate, ()):
+            act(name)
     return predicates, actions
+
+
+def _rewards(schema: md.Schema) -> bool:
+    return any(isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect))
+
+
+def _setters(model: md.Model) -> tuple[dict[str, list[str]], dict[str, list[md.Rule]]]:
+    """By predicate: the actions that set it, and the rules that derive it."""
+    setters: dict[str, list[str]] = {}
+    for name, schema in model.schemas.items():
+        for predicate in {leaf.predicate for leaf in settings(schema.effect)}:
+            setters.setdefault(predicate, []).append(name)
+    rules: dict[str, list[md.Rule]] = {}
+    for rule in model.rules:
+        rules.setdefault(rule.predicate, []).append(rule)
+    return setters, rules

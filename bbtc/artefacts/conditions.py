@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from bbtc.artefacts.cursor import At, clip, nearest
+from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.describe import condition_as_lists
+from bbtc.ground.task import Variable
 from bbtc.kleene import Truth
 
-MAX_DEPTH = 100
+MAX_DEPTH = 256
 """Levels of ``and``, ``or`` and ``not`` a condition may have in an artefact."""
 
 
-condition_to_json = condition_as_lists
+def condition_to_json(condition: Condition, variables: Sequence[Variable]) -> list[object]:
+    """The condition as nested lists. Raises :class:`~bbtc.diagnostics.BbtcError` for one with more levels
+    than would be read."""
+    inner: list[Condition] = [condition]
+    for _ in range(MAX_DEPTH + 1):
+        inner = [part for each in inner if type(each) is not Is for part in _parts(each)]  # leaves have none
+        if not inner:
+            return condition_as_lists(condition, variables)
+    raise BbtcError.single("BBT0605", f"a condition has at most {MAX_DEPTH} levels", hint="nest it less")
+
+
+def _parts(condition: Condition) -> tuple[Condition, ...]:
+    if isinstance(condition, And | Or):
+        return condition.parts
+    return (condition.part,) if isinstance(condition, Not) else ()
 
 
 def condition_from_json(at: At, index: Mapping[str, int], depth: int = 0) -> Condition:

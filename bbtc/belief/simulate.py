@@ -54,6 +54,13 @@ def simulate(task: Task, root: Node, limits: Limits) -> Figures:
     return figures(task, root, explore(task, root, limits))
 
 
+def success_of(chain: Chain) -> Fraction:
+    """The probability that runs end in success."""
+    visits = Absorption(chain).visits()
+    wins = (state for state in chain.final if chain.status[state] is Status.SUCCESS)
+    return sum((visits[state] or Fraction(0) for state in wins), Fraction(0))
+
+
 def figures(task: Task, root: Node, chain: Chain) -> Figures:
     """The figures of a tree whose chain is known."""
     absorption = Absorption(chain)

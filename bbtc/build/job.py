@@ -12,13 +12,15 @@ from bbtc.artefacts.numbers import exact
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
 from bbtc.export.registry import Begun, Files
 from bbtc.files import system_trouble
-from bbtc.limits import Limits
+from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.manifest.read import Export, TreeEntry
 from bbtc.plan.options import Options
 from bbtc.plan.result import Plan
 from bbtc.source import SourceFile
 from bbtc.syntax.reader import decode_source
+from bbtc.tree.deep import stack_room
 from bbtc.tree.nodes import Tree, walk
+from bbtc.watch import Watch, watching
 
 TREE = "tree"
 FIGURES = "figures"
@@ -85,18 +87,24 @@ def broken(name: str, why: str) -> Made:
 
 
 def _perform(job: Job, report: Report) -> Made:
+    limits = Limits(**{"seconds": PLANNING_SECONDS, **dict[str, Any](job.entry.limits)})
+    with stack_room(), watching(limits) as (watch, watched):
+        return _steps(job, report, watch, watched)
+
+
+def _steps(job: Job, report: Report, watch: Watch, limits: Limits) -> Made:
     entry = job.entry
-    limits = Limits(**dict[str, Any](entry.limits))
     steps: dict[str, dict[str, bytes]] = {}
     text = job.tree
     if text is None:
-        plan = _plan(job, report, limits)
+        plan = _plan(job, report, limits, watch)
         tree = plan.tree
         if tree.success_probability < tree.target:
             failure: Failure = "error" if tree.status == "out-of-reach" else "limit"
             return Made(entry.name, diagnostics=tuple(report), short=_shortfall(plan), failure=failure)
         text = dumps(tree_to_json(tree)).encode()
         steps[TREE] = {entry.file: text}
+        limits = watch.over(limits.afresh())  # planning may have used all of the time
     # Exports are made of the artefact, as it will be read by others.
     tree = load_tree(SourceFile(entry.file, text.decode()))
     unmet: list[tuple[int, str]] = []
@@ -115,12 +123,14 @@ def _perform(job: Job, report: Report) -> Made:
     return Made(entry.name, steps, tuple(report), summary=_summary(tree), begun=frozenset(begun))
 
 
-def _plan(job: Job, report: Report, limits: Limits) -> Plan:
+def _plan(job: Job, report: Report, limits: Limits, watch: Watch) -> Plan:
     entry = job.entry
     sources = [decode_source(name, data) for name, data in job.sources]
     task = pipeline.task_of_sources(sources, report, limits, entry.reading)
     options = Options(max_actions=entry.max_actions, retries=entry.retries, guarded=entry.guarded)
-    plan = pipeline.plan_task(task, entry.target, entry.strategy, limits, lambda _: None, options=options)
+    plan = pipeline.plan_task(
+        task, entry.target, entry.strategy, limits, lambda _: None, options=options, search_ends=watch.off
+    )
     if plan.tree.status == "interrupted":
         raise KeyboardInterrupt
     return plan

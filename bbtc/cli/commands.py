@@ -109,5 +109,5 @@ def cli(ctx: click.Context, debug: bool, diagnostic_format: str) -> None:
     DOMAIN and PROBLEM are files in the bbtc language, a superset of PPDDL; one file may hold both,
     and `-` is the standard input.
     """
-    ctx.obj = {"format": diagnostic_format}
+    ctx.obj = {"format": diagnostic_format, "started": ctx.obj}
     del debug  # read by bbtc.cli.main, which must know it before anything can fail

@@ -74,7 +74,7 @@ def command(
 ) -> int:
     """Write TREE in FORMAT. With a DOMAIN and PROBLEM in its place, plan on the way."""
     from bbtc.cli.inputs import is_artefact, is_tree, task_of, tree_of
-    from bbtc.cli.plan import STATUS_EXIT, run_planner
+    from bbtc.cli.plan import STATUS_EXIT, best_tree_on_signals, run_planner
     from bbtc.pipeline import export_tree
     from bbtc.plan.options import DEFAULTS
     from bbtc.plan.strategies import require_strategy
@@ -82,19 +82,26 @@ def command(
     pairs = dict(_pair(option) for option in options)
     require_place(session, form, pairs, output, files, check=check, depfile=depfile)
     require_strategy(strategy, DEFAULTS)
-    limits = session.limits
     sources = [session.read(file) for file in files]
-    status = 0
     if len(sources) == 1 and is_artefact(sources[0]) and is_tree(sources[0]):
         tree = tree_of(sources[0])
-    else:
-        plan = run_planner(session, task_of(session, sources, limits), target, strategy, limits, quiet=True)
-        tree, status = plan.tree, STATUS_EXIT[plan.tree.status]
-    if verified:
-        require_verified(session, tree)
-    artefact = export_tree(tree, form, pairs, limits)
-    session.write(output, artefact, check=check, depfile=depfile)
-    return status
+        if verified:
+            require_verified(session, tree)
+        artefact = export_tree(tree, form, pairs, session.limits)
+        session.write(output, artefact, check=check, depfile=depfile)
+        return 0
+    limits = session.watch_planning()
+    task = task_of(session, sources, limits)
+    with best_tree_on_signals() as signals:
+        tree = run_planner(session, task, target, strategy, limits, quiet=True, signals=signals).tree
+        if verified:
+            signals.end_at_once()
+            require_verified(session, tree)
+            signals.hold()
+        # Planning may have used all of the time: what was found gets some of its own.
+        artefact = export_tree(tree, form, pairs, limits.afresh())
+        session.write(output, artefact, check=check, depfile=depfile)
+    return STATUS_EXIT[tree.status]
 
 
 def require_place(

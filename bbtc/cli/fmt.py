@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import click
 
-from bbtc.cli.session import Session
+from bbtc.cli.session import Session, reading_limits
 from bbtc.cli.session import command as session_command
-from bbtc.diagnostics import BbtcError
+from bbtc.diagnostics import BbtcError, LimitReached
 
 
 @click.command("fmt")
 @click.argument("files", nargs=-1, required=True, metavar="FILES...")
 @click.option("--check", is_flag=True, help="Write nothing; show a diff and fail if a layout would change.")
+@reading_limits
 @session_command
 def command(session: Session, files: tuple[str, ...], check: bool) -> None:
     """Give FILES their canonical layout, in place; `-` reads the standard input and writes to the
@@ -29,10 +30,12 @@ def command(session: Session, files: tuple[str, ...], check: bool) -> None:
     for file in files:
         try:
             source = session.read(file)
-            text = format_source(source)
+            text = format_source(source, session.limits)
             if file == "-" and check and text != source.text:
                 raise drift(source.name, source.text.encode(), text.encode())
             changed += write(file, text, check=check)
+        except LimitReached:
+            raise
         except BbtcError as error:
             # The other files get their layout all the same.
             for diagnostic in error.diagnostics:

@@ -13,6 +13,7 @@ from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERNAL, EXIT_INTERRUPTED
 from bbtc.cli.output import tell
 from bbtc.files import system_trouble
 from bbtc.printable import printable
+from bbtc.watch import process_started
 
 _interrupts: list[int] = []
 """The times that Ctrl-C was heard."""
@@ -24,7 +25,7 @@ def run() -> int:
     if signal.getsignal(signal.SIGINT) not in {signal.SIG_IGN, signal.SIG_DFL, None}:
         signal.signal(signal.SIGINT, _interrupt)
     try:
-        status = cli.main(standalone_mode=False)
+        status = cli.main(standalone_mode=False, obj=process_started())
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     except click.ClickException as error:

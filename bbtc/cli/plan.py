@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from fractions import Fraction
+from types import FrameType
 from typing import TYPE_CHECKING
 
 import click
@@ -17,22 +19,28 @@ from bbtc.cli.session import (
     Count,
     Probability,
     Session,
-    limit_options,
     output_options,
+    planning_limits,
     problem_options,
 )
 from bbtc.cli.session import (
     command as session_command,
 )
 from bbtc.cli.verify import require_verified
+from bbtc.diagnostics import LimitReached
 from bbtc.plan.strategies import DEFAULT
+from bbtc.watch import importing
 
 if TYPE_CHECKING:
     from bbtc.ground.task import Task
     from bbtc.limits import Limits
     from bbtc.plan.options import Options, Retries
     from bbtc.plan.result import Plan, Refinement
+    from bbtc.plan.why_not import DeadEnd
     from bbtc.tree.nodes import Status
+
+_TELLING = 1.0
+"""Seconds for finding out why a target is out of reach, which is told besides."""
 
 STATUS_EXIT: dict[Status, int] = {
     "target-reached": 0,
@@ -67,7 +75,7 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option("--verify", "verified", is_flag=True, help="Write the tree only if `bbtc verify` takes it.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
 @problem_options
-@limit_options
+@planning_limits
 @output_options
 @session_command
 def command(
@@ -110,11 +118,13 @@ def command(
     if bounds:
         wanted = task.goal_probability if target is None else target
         return _print_bounds(session, task, wanted, options, output, as_json=as_json)
-    plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet)
-    if verified:
-        require_verified(session, plan.tree)
-    text = artefacts.dumps(artefacts.tree_to_json(plan.tree))
-    session.write(output, text, check=check, depfile=depfile)
+    with best_tree_on_signals() as signals:
+        plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet, signals=signals)
+        if verified:
+            signals.end_at_once()
+            require_verified(session, plan.tree)
+        text = artefacts.dumps(artefacts.tree_to_json(plan.tree))
+        session.write(output, text, check=check, depfile=depfile)
     return STATUS_EXIT[plan.tree.status]
 
 
@@ -124,7 +134,8 @@ def _print_bounds(
     from bbtc.cli.bounds_report import bounds_json, bounds_report
     from bbtc.plan.bounds import task_value
 
-    with _terminated_like_interrupted():
+    with best_tree_on_signals() as signals:
+        signals.listen()
         value = task_value(task, session.limits, options, costs=True)
     session.clear()
     text = bounds_json(value, target) if as_json else bounds_report(task, value, target)
@@ -145,8 +156,10 @@ def run_planner(
     options: Options | None = None,
     *,
     quiet: bool,
+    signals: Signals,
 ) -> Plan:
-    """Plan, telling the session each refinement as it is made and how planning ended."""
+    """Plan, telling the session each refinement as it is made and how planning ended. Afterwards neither a
+    limit nor a signal keeps the tree from being written."""
     from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
     from bbtc.cli.wording import exact, plan_summary, refinement_line, simplified_line
     from bbtc.ground.describe import describe
@@ -166,8 +179,21 @@ def run_planner(
     if not quiet:
         wanted = task.goal_probability if target is None else target
         session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
-    with _terminated_like_interrupted():
-        plan = plan_task(task, target, strategy, limits, tell, options=options)
+
+    def search_ends() -> None:
+        signals.hold()
+        session.watch.off()
+
+    plan = plan_task(
+        task,
+        target,
+        strategy,
+        limits,
+        tell,
+        options=options,
+        search_begins=signals.listen,
+        search_ends=search_ends,
+    )
     if plan.tree.status == "stuck":
         session.report.warning(
             "BBT0502",
@@ -176,7 +202,9 @@ def run_planner(
             hint="another strategy may reach it",
         )
     most = options.max_actions
-    ends = dead_ends(plan.tree, replace(limits, seconds=None))
+    ends: tuple[DeadEnd, ...] = ()
+    with suppress(LimitReached):
+        ends = dead_ends(plan.tree, limits.overtime(_TELLING))
     made = simplified_line(told[-1], plan.tree) if told and not quiet else []
     lines = [
         *made,
@@ -189,18 +217,55 @@ def run_planner(
     return plan
 
 
+@dataclass(slots=True)
+class Signals:
+    """What SIGINT (Ctrl-C) and SIGTERM do to planning: the first one ends the search with the best tree so
+    far; the third one, for people without patience, ends the program without it."""
+
+    came: int = 0
+    listening: bool = False
+    held: bool = False
+
+    def listen(self) -> None:
+        """From now on there is a search that can be ended."""
+        self.listening = True
+
+    def hold(self) -> None:
+        """The search is over, and what is left is to write the tree: do not disturb."""
+        self.held = True
+
+    def end_at_once(self) -> None:
+        """From now on a signal ends the program."""
+        self.listening, self.held, self.came = True, False, 0
+
+    def stop(self, number: int, frame: FrameType | None) -> None:
+        """The handler."""
+        if not self.held and (not self.listening or importing(frame)):
+            # Too early, in a moment it will do.
+            threading.Timer(_MOMENT, os.kill, (os.getpid(), number)).start()
+            return
+        self.came += 1
+        if self.came >= _IMPATIENT or (self.came == 1 and not self.held):
+            raise KeyboardInterrupt
+
+
+_MOMENT = 0.05  # seconds
+_IMPATIENT = 3
+
+
 @contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """SIGTERM ends planning as Ctrl-C does: with the best tree so far."""
-
-    def stop(_number: int, _frame: object) -> None:
-        raise KeyboardInterrupt
-
+def best_tree_on_signals() -> Iterator[Signals]:
+    """Handle signals as :class:`Signals` says."""
+    signals = Signals()
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield signals
         return
-    before = signal.signal(signal.SIGTERM, stop)
+    kinds = [signal.SIGTERM]
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # by whoever started us
+        kinds.append(signal.SIGINT)
+    before = {kind: signal.signal(kind, signals.stop) for kind in kinds}
     try:
-        yield
+        yield signals
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for kind, handler in before.items():
+            signal.signal(kind, handler)

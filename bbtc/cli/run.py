@@ -77,6 +77,7 @@ def command(
     if not batch and on_terminal(sys.stdin) and on_terminal(sys.stdout):
         while not stepper.finished and (choice := taken.next(stepper.now.branches)) is not None:
             stepper.step(choice)
+        session.watch.off()  # who looks at a tree has all the time there is
         _interact(loaded, stepper, full)
         return 0
     color = on_terminal(sys.stdout) and "NO_COLOR" not in os.environ

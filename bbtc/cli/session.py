@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import math
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar, cast
 
 import click
+from click.core import ParameterSource
 
 from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine, on_terminal, tell
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report, Severity
 from bbtc.files import Outputs, read_file, require_apart, require_writable
-from bbtc.limits import Limits
+from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.printable import printable
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
+from bbtc.tree.deep import stack_room
+from bbtc.watch import Watch, watching
 
 if TYPE_CHECKING:
     from bbtc.export.registry import Artefact
@@ -38,13 +43,22 @@ class Session:
     reading: Reading = AS_WRITTEN
     inputs: list[str] = field(default_factory=list)
     line: ProgressLine | None = None
+    watch: Watch = field(default_factory=Watch)
 
     @classmethod
-    def begun(cls, form: str, limits: Limits, reading: Reading) -> Session:
-        """A session that shows progress where people can see it."""
+    @contextlib.contextmanager
+    def begun(cls, form: str, limits: Limits, reading: Reading) -> Iterator[Session]:
+        """A session that shows progress where people can see it, and whose limits are watched over."""
         line = ProgressLine.on_terminal() if form == "text" else None
-        watched = limits if line is None else replace(limits, watcher=line.watch)
-        return cls(form, watched, reading=reading, line=line)
+        with watching(limits if line is None else replace(limits, watcher=line.watch)) as (watch, told):
+            yield cls(form, told, reading=reading, line=line, watch=watch)
+
+    def watch_planning(self) -> Limits:
+        """The limits for planning on the way: bounded in time even where nobody asked for it."""
+        context = click.get_current_context()
+        if context.get_parameter_source("limit_seconds") is ParameterSource.DEFAULT:
+            self.limits = self.watch.over(replace(self.limits, seconds=PLANNING_SECONDS))
+        return self.limits
 
     def clear(self) -> None:
         """Take away what is shown of the progress."""
@@ -171,19 +185,25 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
         limits = Limits(**{key.removeprefix("limit_"): value for key, value in bounds.items()})
         ways = {key: arguments.pop(key) for key in list(arguments) if key.startswith("reading_")}
         reading = Reading(**{key.removeprefix("reading_"): value for key, value in ways.items()})
-        session = Session.begun(own_format or ctx.obj["format"], limits, reading)
-        try:
-            status = function(session, **arguments)
-        except BbtcError as error:
-            _fail(session, error)
-        except RecursionError:
-            if limits.depth <= Limits().depth:
-                raise  # a bug: what is nested no deeper than that never takes so many frames
-            message = "an input is nested deeper than it can be worked with"
-            _fail(session, BbtcError.single("BBT0005", message, hint="nest it less, whatever --max-depth is"))
-        finally:
-            session.clear()
-        session.show([*session.report])
+        form = own_format or ctx.obj["format"]
+        if ctx.obj["started"] is not None:
+            limits = limits.since(ctx.obj["started"])
+        with stack_room(), Session.begun(form, limits, reading) as session:
+            try:
+                status = function(session, **arguments)
+            except BbtcError as error:
+                session.watch.off()
+                _fail(session, error)
+            except RecursionError:
+                if limits.depth <= Limits().depth:
+                    raise  # a bug: what is nested no deeper than that never takes so many frames
+                message = "an input is nested deeper than it can be worked with"
+                hint = "nest it less, whatever --max-depth is"
+                _fail(session, BbtcError.single("BBT0005", message, hint=hint))
+            finally:
+                session.clear()
+            session.watch.off()
+            session.show([*session.report])
         sys.exit(status or 0)
 
     option = click.option(
@@ -194,6 +214,18 @@ def command(function: Callable[..., int | None]) -> Callable[..., None]:
         help="How diagnostics are written to stderr.",
     )
     return option(click.pass_context(cast("Callable[..., None]", run)))
+
+
+class Seconds(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """A bound on time: a number of seconds, or ``none``."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The seconds; infinity for ``none``. Anything else is wrong usage."""
+        if value == "none":
+            return math.inf
+        return click.FloatRange(0, min_open=True).convert(value, param, ctx)
 
 
 class Probability(click.ParamType):  # type: ignore[type-arg,unused-ignore]
@@ -277,8 +309,8 @@ _GROUNDING = (
     ("--max-ground-actions", "actions", 1, None, 1, "Ground actions and templates."),
     ("--max-facts", "facts", 1, None, 1, "Facts derived in grounding."),
     ("--max-bindings", "bindings", 1, None, 1, "Objects that quantifiers are tried with."),
-    ("--max-memory", "memory", 1, None, _MIB, "MiB of memory."),
 )
+_MEMORY = (("--max-memory", "memory", 1, None, _MIB, "MiB of memory."),)
 _RUNNING = (
     ("--max-states", "states", 1, None, 1, "States of a simulation."),
     ("--max-nodes", "nodes", 1, None, 1, "Nodes of a tree."),
@@ -286,7 +318,9 @@ _RUNNING = (
 _Table: TypeAlias = tuple[tuple[str, str, int, int | None, int, str], ...]
 
 
-def _limits(*tables: _Table, timed: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _limits(
+    *tables: _Table, seconds: float | None = None
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     rows = [row for table in tables for row in table]
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -301,24 +335,28 @@ def _limits(*tables: _Table, timed: bool) -> Callable[[Callable[..., Any]], Call
                 help=told,
                 callback=lambda _context, _parameter, value, unit=unit: value * unit,
             )(function)
-        if timed:
-            function = click.option(
-                "--time-limit",
-                "limit_seconds",
-                type=click.FloatRange(0, min_open=True),
-                metavar="SECONDS",
-                help="Wall-clock time.",
-            )(function)
-        return function
+        return click.option(
+            "--time-limit",
+            "limit_seconds",
+            type=Seconds(),
+            default="none" if seconds is None else f"{seconds:g}",
+            show_default=True,
+            metavar="SECONDS",
+            help="Seconds since the start, or none.",
+            callback=lambda _context, _parameter, value: None if math.isinf(value) else value,
+        )(function)
 
     return decorate
 
 
-reading_limits = _limits(_READING, timed=False)
+reading_limits = _limits(_READING, _MEMORY)
 """Options for a command that only reads; the values are in :attr:`Session.limits`."""
 
-grounding_limits = _limits(_READING, _GROUNDING, timed=True)
+grounding_limits = _limits(_READING, _GROUNDING, _MEMORY)
 """Options for a command that reads and grounds."""
 
-limit_options = _limits(_READING, _GROUNDING, _RUNNING, timed=True)
-"""Options for a command that reads, grounds, plans and simulates."""
+limit_options = _limits(_READING, _GROUNDING, _MEMORY, _RUNNING)
+"""Options for a command that reads, grounds and simulates."""
+
+planning_limits = _limits(_READING, _GROUNDING, _MEMORY, _RUNNING, seconds=PLANNING_SECONDS)
+"""The same for a command that plans, which ends in any case."""

@@ -51,7 +51,8 @@ def require_verified(session: Session, tree: Tree) -> None:
     as long as the time limit allows, counted anew: planning may have used all of it."""
     from bbtc.pipeline import verify_tree
 
-    verdict = verify_tree(tree, session.limits.afresh())
+    verdict = verify_tree(tree, session.watch.over(session.limits.afresh()))
+    session.watch.off()
     verdict.raise_problems()
     engines = ["our own solver"] if verdict.own is not None else []
     engines += [f"Storm {verdict.storm.version}"] if verdict.storm is not None else []

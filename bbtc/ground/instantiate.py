@@ -117,7 +117,8 @@ class _TaskBuilder:
         self.atoms = atoms
         self.lowering = Lowering(atoms, limits)
         self.effects = EffectLowering(self.lowering, report)
-        self._templates: dict[str, gt.GroundTemplate] = {}
+        self._made: set[str] = set()
+        self._asked: dict[str, tuple[str, Row]] = {}
         self._rows: dict[str, set[Row]] = {}
         self._makers = {
             name: _TemplateMaker(self, template) for name, template in self.model.templates.items()
@@ -201,14 +202,19 @@ class _TaskBuilder:
         for name, rows in zip(self.model.templates, self.reached.templates, strict=True):
             for row in rows:
                 self.template(name, row)
-        return tuple(template for _, template in sorted(self._templates.items()))
+        made: dict[str, gt.GroundTemplate] = {}
+        while self._asked:  # those that a template calls are asked for while it is made
+            self.limits.check_time("grounding")
+            name, (template, row) = self._asked.popitem()
+            made[name] = self._makers[template].make(row)
+            self._made.add(name)
+        return tuple(template for _, template in sorted(made.items()))
 
     def template(self, template: str, row: Row) -> str:
-        """The name of a ground template, which is made if it is new."""
+        """The name of a ground template, which will be made if it is new."""
         name = gt.ground_name(template, self.universe.args(row))
-        if name not in self._templates:
-            # Templates do not recurse, so the depth is bounded by their number.
-            self._templates[name] = self._makers[template].make(row)
+        if name not in self._made:
+            self._asked[name] = template, row
         return name
 
     # --- initial states ----------------------------------------------------------------------

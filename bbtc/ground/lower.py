@@ -306,6 +306,10 @@ def _until(end: Condition, parts: Iterable[Condition]) -> list[Condition] | None
     return found
 
 
+_FEW_COLUMNS = 5
+"""So many columns are compared two by two, which is faster."""
+
+
 class _Conjunction:
     """The conjunction of some parts in normal form, for many argument rows at once."""
 
@@ -332,11 +336,11 @@ class _Conjunction:
                 case _:
                     self._columns.append(lowering.lowered(part, parameters).all)
                     self._kinds.append(None)
-        self._alike = [
-            (one, other)
-            for one, other in combinations(range(len(parts)), 2)
-            if self._kinds[one] == self._kinds[other]
-        ]
+        alike: dict[tuple[str, Truth], list[int]] = {}
+        for number, kind in enumerate(self._kinds):
+            if kind is not None:
+                alike.setdefault(kind, []).append(number)
+        self._alike = [numbers for numbers in alike.values() if len(numbers) > 1]
 
     def all(self, rows: list[Row]) -> list[Condition]:
         """The condition of each row."""
@@ -354,7 +358,14 @@ class _Conjunction:
         for kind, column in zip(self._kinds, columns, strict=True):
             if kind is None or (kind[1] is Truth.FALSE and any(map(is_, column, repeat(TRUE)))):
                 return False
-        return not any(any(map(is_, columns[one], columns[other])) for one, other in self._alike)
+        return not any(_repeats([columns[number] for number in numbers]) for numbers in self._alike)
+
+
+def _repeats(columns: list[list[Condition]]) -> bool:
+    """Whether the same leaf stands in two of the columns, in some row."""
+    if len(columns) <= _FEW_COLUMNS:
+        return any(any(map(is_, one, other)) for one, other in combinations(columns, 2))
+    return any(len(set(map(id, row))) < len(row) for row in zip(*columns, strict=True))
 
 
 def _leaf_column(

@@ -15,6 +15,7 @@ the start).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -34,6 +35,9 @@ _FEW = 20_000
 """Up to so many bindings, a condition is asked for wherever its own objects allow it."""
 _MOST_ALTERNATIVES = 16
 """So many rules at most take the place of one with disjunctions."""
+_LONGEST_BODY = 64
+"""A rule with more literals becomes a chain of rules."""
+_VARIABLES = re.compile(r"\b[VN]\w+")
 
 
 @dataclass(slots=True)
@@ -182,8 +186,10 @@ class ProgramBuilder:
         parts = list(formulas)
         simple = [part for part in parts if self._is_simple(part)]
         complex_ = [part for part in parts if not self._is_simple(part)]
-        near = [part for part in complex_ if self._count(_read(part, scope)) <= _FEW]
-        far = [part for part in complex_ if part not in near]
+        near: list[mf.Formula] = []
+        far: list[mf.Formula] = []
+        for part in complex_:
+            (near if self._count(_read(part, scope)) <= _FEW else far).append(part)
         for part in far:
             alternatives = list(disjuncts(part))
             if 1 < len(alternatives) <= most:
@@ -193,8 +199,12 @@ class ProgramBuilder:
                     yield from self._bodies(chosen, parameters, scope, base, most // len(alternatives))
                 return
         body = self._conjunction(simple, [*base, *self._typed(parameters, simple)])
+        contexts: dict[tuple[Parameter, ...], list[str]] = {}
         for part in near:
-            body = self._with(part, body, self._near(part, simple, scope))
+            read = _read(part, scope)
+            if read not in contexts:
+                contexts[read] = self._near(read, simple)
+            body = self._with(part, body, contexts[read])
         if far and body is not None:
             candidate = _atom(self._fresh(), scope)
             self._rule(candidate, body)
@@ -204,9 +214,8 @@ class ProgramBuilder:
         if body is not None:
             yield body
 
-    def _near(self, part: mf.Formula, simple: list[mf.Formula], scope: tuple[Parameter, ...]) -> list[str]:
-        """A context for a part: its parameters, and the atoms that hold of nothing else."""
-        parameters = _read(part, scope)
+    def _near(self, parameters: tuple[Parameter, ...], simple: list[mf.Formula]) -> list[str]:
+        """A context for parts that read some parameters: these, and the atoms that hold of nothing else."""
         names = {parameter.name for parameter in parameters}
         atoms = [each for each in simple if isinstance(each, mf.Atom) and names.issuperset(free(each))]
         context = self._conjunction(atoms, self._typed(parameters, atoms))
@@ -220,12 +229,12 @@ class ProgramBuilder:
         return [head]
 
     def _with(self, part: mf.Formula, body: list[str] | None, context: list[str]) -> list[str] | None:
-        """The body and the literals of a complex part; None if they can never be true."""
+        """The body, to which the literals of a complex part are added; None if they can never be true."""
         if body is None:
             return None
         literals = list(self._complex(part, context))
-        found = [literal for literal in literals if literal is not None]
-        return [*body, *found] if len(found) == len(literals) else None
+        body += [literal for literal in literals if literal is not None]
+        return None if None in literals else body
 
     # --- conditions --------------------------------------------------------------------------
 
@@ -407,7 +416,35 @@ class ProgramBuilder:
         return _variable(term) if mf.is_parameter(term) else str(self.universe.index[term])
 
     def _rule(self, head: str, body: list[str]) -> None:
+        body = list(dict.fromkeys(body))
+        if len(body) > _LONGEST_BODY:
+            body = self._chained(head, body)
         self._rules.append(f"{head} :- {', '.join(body)}." if body else f"{head}.")
+
+    def _chained(self, head: str, body: list[str]) -> list[str]:
+        """A short body in place of a long one, which takes the grounder quadratic time: what holds of the
+        first literals has a predicate of its own, that of these and the next ones another, and so on."""
+        # What only compares or denies what others bind comes after them; an equality may bind, too.
+        last = [each for each in body if "=" in each and "!=" not in each]
+        tests = [each for each in body if "!=" in each or each.startswith("not ")]
+        binding = [each for each in body if "=" not in each and not each.startswith("not ")]
+        bound: dict[str, None] = {}
+        for literal in binding:
+            bound.update(dict.fromkeys(_VARIABLES.findall(literal)))
+        ordered = [*binding, *(each for each in tests if bound.keys() >= set(_VARIABLES.findall(each)))]
+        last += [each for each in tests if not bound.keys() >= set(_VARIABLES.findall(each))]
+        needed = {*_VARIABLES.findall(head), *(name for each in last for name in _VARIABLES.findall(each))}
+        until = {name: place for place, each in enumerate(ordered) for name in _VARIABLES.findall(each)}
+        found: dict[str, None] = {}
+        before: list[str] = []
+        for start in range(0, len(ordered), _LONGEST_BODY):
+            part = ordered[start : start + _LONGEST_BODY]
+            found.update((name, None) for each in part for name in _VARIABLES.findall(each))
+            end = start + len(part)
+            name = _written(self._fresh(), [each for each in found if each in needed or until[each] >= end])
+            self._rules.append(f"{name} :- {', '.join([*before, *part])}.")
+            before = [name]
+        return [*before, *last]
 
 
 def all_groups(

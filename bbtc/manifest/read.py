@@ -68,7 +68,7 @@ class TreeEntry:
     retries: Retries = "least"
     guarded: bool = False
     reading: Reading = AS_WRITTEN
-    limits: tuple[tuple[str, int], ...] = ()
+    limits: tuple[tuple[str, int | None], ...] = ()
     exports: tuple[Export, ...] = ()
     expect: tuple[Expectation, ...] = ()
     span: Span | None = field(default=None, compare=False)
@@ -182,9 +182,12 @@ class _Reader:
             input_spans=tuple(self.marked.span(each.path) for each in given),
         )
 
-    def _limits(self, at: At) -> tuple[tuple[str, int], ...]:
+    def _limits(self, at: At) -> tuple[tuple[str, int | None], ...]:
         members = self._members(at, [], list(_LIMITS))
-        return tuple((_LIMITS[name], _count(each)) for name, each in sorted(members.items()))
+        return tuple(
+            (_LIMITS[name], None if name == "time" and each.value == "none" else _count(each))
+            for name, each in sorted(members.items())
+        )
 
     def _expectations(self, at: At) -> tuple[Expectation, ...]:
         return tuple(self.faults.each(self._few(at.elements(), at), self._expectation))

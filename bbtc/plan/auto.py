@@ -62,7 +62,7 @@ def plan_advised(
     :func:`plan_auto`, and as that does."""
     advised = None
     if task.templates and len(task.actions) <= MANY_ACTIONS and options == DEFAULTS:
-        advised = _refined(task, target, limits, limits.nodes)
+        advised = _refined(task, target, limits, limits.nodes, options)
         if advised.tree.status in {"target-reached", "interrupted"}:
             return _told(advised, progress)
     return _told(_best(task, target, limits, options, advised), progress)
@@ -87,7 +87,7 @@ def _best(task: Task, target: Fraction, limits: Limits, options: Options, refine
         second = _policy(task, target, limits, options, plans[0])
         plans.extend([] if second is None else [second])
         if all(plan.tree.status != "interrupted" for plan in plans):
-            third = _refine(task, target, limits, min(plans, key=_rank), refined)
+            third = _refine(task, limits, options, min(plans, key=_rank), refined)
             plans.extend([] if third is None else [third])
     return _with_findings(min(plans, key=_rank), plans)
 
@@ -106,8 +106,8 @@ def _policy(task: Task, target: Fraction, limits: Limits, options: Options, know
     return found
 
 
-def _refine(task: Task, target: Fraction, limits: Limits, best: Plan, refined: Plan | None) -> Plan | None:
-    tree = best.tree
+def _refine(task: Task, limits: Limits, options: Options, best: Plan, refined: Plan | None) -> Plan | None:
+    tree, target = best.tree, best.tree.target
     most = limits.nodes
     if tree.status == "target-reached":
         most = min(most, size(tree.root) - 1)  # a larger tree would not be kept
@@ -120,14 +120,14 @@ def _refine(task: Task, target: Fraction, limits: Limits, best: Plan, refined: P
     if most < 1:
         return None
     try:
-        return _refined(task, target, limits, most)
+        return _refined(task, target, limits, most, options)
     except LimitReached:  # not even the goal alone is small enough
         return None
 
 
-def _refined(task: Task, target: Fraction, limits: Limits, nodes: int) -> Plan:
+def _refined(task: Task, target: Fraction, limits: Limits, nodes: int, options: Options) -> Plan:
     few = replace(limits, nodes=nodes, states=min(limits.states, _REFINE_STATES))
-    return refine(task, target, few, _silent)
+    return refine(task, target, few, _silent, options)
 
 
 def _rank(plan: Plan) -> tuple[bool, Fraction, int, bool, Fraction]:
@@ -141,13 +141,19 @@ def _rank(plan: Plan) -> tuple[bool, Fraction, int, bool, Fraction]:
 def _with_findings(kept: Plan, plans: list[Plan]) -> Plan:
     """The plan with what the others brought to light: bounds, and what stopped them."""
     tree = kept.tree
+    interrupted = any(plan.tree.status == "interrupted" for plan in plans)
+    if interrupted and tree.status != "target-reached":
+        tree = replace(tree, status="interrupted")
+        kept = replace(kept, tree=tree)
     known = [plan.tree.bounds for plan in plans if plan.tree.bounds is not None]
     if not known:
         return kept
     lower = max(tree.success_probability, *(bounds[0] for bounds in known))
     upper = max(lower, min(bounds[1] for bounds in known))
     status = tree.status
-    if status == "stuck":
-        status = "out-of-reach" if upper < tree.target else "limit-reached"
+    if status in {"stuck", "limit-reached"} and upper < tree.target:
+        status = "out-of-reach"
+    elif status == "stuck":
+        status = "limit-reached"
     stop = kept.stop or next((plan.stop for plan in plans if plan.stop is not None), None)
     return replace(kept, tree=replace(tree, bounds=(lower, upper), status=status), stop=stop)

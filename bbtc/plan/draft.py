@@ -25,6 +25,7 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
+from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import (
     Condition,
     Is,
@@ -48,7 +49,9 @@ from bbtc.ground.task import (
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node
+from bbtc.tree.deep import Deep, unwind
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, tree_depth
+from bbtc.tree.validate import MAX_DEPTH
 
 Doing: TypeAlias = GroundAction | GroundTemplate
 
@@ -244,7 +247,7 @@ class _Freezer:
             case GroundAction():
                 return [self.action(attempt, "action", attempt.doing.name, guarded=False)]
             case GroundTemplate():
-                return [self.template(attempt, "body", attempt.doing)]
+                return [unwind(self.template(attempt, "body", attempt.doing))]
             case _:
                 assert_never(attempt.doing)
 
@@ -255,21 +258,20 @@ class _Freezer:
         self.owners[node.id] = Owner(None, attempt)
         return node
 
-    def template(self, attempt: Attempt, role: str, template: GroundTemplate) -> Node:
-        body = self.body(attempt, role, template.body)
+    def template(self, attempt: Attempt, role: str, template: GroundTemplate) -> Deep[Node]:
+        body: Node = yield self.body(attempt, role, template.body)
         if isinstance(body, ControlNode) and body.template is None:
             return ControlNode(body.id, body.kind, body.children, template=template.name)
         # A body of one leaf, or of one call: the template still shows as a node of its own.
         return ControlNode(self.id(attempt.ids, f"{role}.call"), "sequence", (body,), template=template.name)
 
-    def body(self, attempt: Attempt, role: str, body: Body) -> Node:
+    def body(self, attempt: Attempt, role: str, body: Body) -> Deep[Node]:
         match body:
             case BodyControl():
-                children = tuple(
-                    self.body(attempt, f"{role}.{position}", child)
-                    for position, child in enumerate(body.children)
-                )
-                return ControlNode(self.id(attempt.ids, role), body.kind, children)
+                children: list[Node] = []
+                for position, child in enumerate(body.children):
+                    children.append((yield self.body(attempt, f"{role}.{position}", child)))
+                return ControlNode(self.id(attempt.ids, role), body.kind, tuple(children))
             case BodyCondition():
                 node = ConditionNode(self.id(attempt.ids, role), body.condition)
                 self.owners[node.id] = Owner(None, attempt)
@@ -279,7 +281,8 @@ class _Freezer:
                 guarded = bool(conjuncts(action.precondition))
                 return self.action(attempt, role, action.name, guarded=guarded)
             case BodyTemplate():
-                return self.template(attempt, role, self.task.template_by_name[body.template])
+                called: Node = yield self.template(attempt, role, self.task.template_by_name[body.template])
+                return called
             case _:
                 assert_never(body)
 
@@ -307,8 +310,12 @@ class Frozen:
 
 
 def freeze(draft: Draft, limits: Limits) -> Frozen:
-    """The draft as a tree. Raises :class:`bbtc.diagnostics.LimitReached` if it has too many nodes."""
+    """The draft as a tree. Raises :class:`bbtc.diagnostics.LimitReached` if it has too many nodes, or more
+    levels than a tree may have."""
     freezer = _Freezer(draft, limits)
     goals = [freezer.subgoal(goal) for goal in draft.goals]
     root = freezer.control(draft.ids, "sequence", "root", goals)
+    if tree_depth(root) > MAX_DEPTH:
+        message = f"a tree has at most {MAX_DEPTH} levels, which ended planning"
+        raise LimitReached([Diagnostic("BBT0504", message, hint="another strategy may need fewer")])
     return Frozen(root, freezer.owners, freezer.actions)

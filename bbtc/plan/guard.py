@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import count
 
-from bbtc.belief.simulate import simulate
+from bbtc.belief.chain import explore
+from bbtc.belief.simulate import figures
 from bbtc.ground.condition import TRUE, conjuncts
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -26,13 +27,15 @@ def guarded(plan: Plan, limits: Limits) -> Plan:
     task, limits = plan.tree.task, replace(limits, seconds=None)
     root = _with_goal(task, plan.tree.root)
     found = _with_guards(task, root, below_retries=True)
-    done = simulate(task, found, limits)
+    chain = explore(task, found, limits)
+    done = figures(task, found, chain)
     if (done.success, done.cost) != (plan.figures.success, plan.figures.cost):
         found = _with_guards(task, root, below_retries=False)
-        done = simulate(task, found, limits)
+        chain = explore(task, found, limits)
+        done = figures(task, found, chain)
     if (done.success, done.cost) != (plan.figures.success, plan.figures.cost):
         raise AssertionError("a guard changed what a tree does")
-    return replace(plan, tree=replace(plan.tree, root=found), figures=done)
+    return replace(plan, tree=replace(plan.tree, root=found), figures=done, chain=chain)
 
 
 def most_more(task: Task) -> int:

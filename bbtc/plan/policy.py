@@ -7,29 +7,29 @@ often it tries again (:mod:`bbtc.plan.policy_retry`). 5. Simulate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from bbtc.belief.chain import explore
-from bbtc.belief.simulate import Figures, simulate
+from bbtc.belief.simulate import success_of
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.plan.best_tree import BestTree
 from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.policy_budget import phases
 from bbtc.plan.policy_retry import longest_run
 from bbtc.plan.policy_space import best_offers, likely_offers
 from bbtc.plan.result import Plan, Progress
-from bbtc.plan.shrink import finished, shrunk
+from bbtc.plan.shrink import GRACE, finish, shrunk
 from bbtc.plan.simplify import numbered, simplified, size
 from bbtc.plan.synthesis_tree import in_phases, synthesize
 from bbtc.plan.value import Bounds
 from bbtc.plan.value_best import best_known, best_within
-from bbtc.tree.nodes import ConditionNode, Node, Status, Tree
+from bbtc.tree.nodes import ConditionNode, Node
 
 _BEFORE_TREE = 0.6  # of the time, for all that comes before a tree
 _DRAFTS = (50, 1000)  # states of a larger policy that a tree is made of first, to fall back on
-_GRACE = 0.5  # seconds to make a tree of what is known once the user interrupts
 
 
 @dataclass(slots=True)
@@ -40,8 +40,7 @@ class _Search:
     target: Fraction
     limits: Limits
     options: Options
-    root: Node
-    figures: Figures
+    best: BestTree
     whole: bool = False
     bounds: Bounds = field(default_factory=lambda: Bounds(Fraction(0), Fraction(1)))
     stop: Diagnostic | None = None
@@ -62,7 +61,7 @@ class _Search:
     def _without_end(self) -> None:
         best = best_known(self.task, self.limits.part(_BEFORE_TREE), self.target, whole=self.whole)
         self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
-        limits = self.limits.within(_GRACE) if best.interrupted else self.limits
+        limits = self.limits.within(GRACE) if best.interrupted else self.limits
         for most in _DRAFTS:
             draft = likely_offers(best.found, most)
             if draft is None:
@@ -70,7 +69,7 @@ class _Search:
             self._keep(synthesize(self.task, draft, limits), limits)
         offers, _ = best_offers(best.found, limits)
         self._keep(synthesize(self.task, offers, limits), limits)
-        self._keep(finished(self.task, self.root, self.target, limits, self.options), limits)
+        finish(self.best, limits, self.options)
 
     def _within(self, steps: int) -> None:
         best = best_within(self.task, self.limits.part(_BEFORE_TREE), steps)
@@ -85,16 +84,17 @@ class _Search:
                 done = True
         if not done:
             self._keep(in_phases(self.task, [(part.steps, part.offers) for part in parts], self.limits))
-        simple = simplified(self.task, self.root, self.limits)
+        simple = simplified(self.task, self.best.root, self.limits)
         self._keep(numbered(shrunk(self.task, simple, self.target, self.limits)))
 
     def _keep(self, root: Node, limits: Limits | None = None) -> None:
         """Take a tree for the best so far, unless it does worse and does not reach the target."""
         limits = limits or self.limits
         limits.check_nodes(size(root))
-        found = simulate(self.task, root, limits)
-        if found.success >= min(self.target, self.figures.success):
-            self.root, self.figures = root, found
+        chain = explore(self.task, root, limits)
+        success = success_of(chain)
+        if success >= min(self.target, self.best.success):
+            self.best.take(root, chain, success)
 
 
 def plan_policy(
@@ -110,20 +110,16 @@ def plan_policy(
     by then. Only with ``whole`` it raises ``LimitReached`` instead where the task has more states than
     the limit."""
     goal: Node = numbered(ConditionNode("", task.goal))
-    initial = simulate(task, goal, limits)
-    search = _Search(task, target, limits, options, goal, initial, whole)
+    search = _Search(
+        task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole
+    )
     search.run()
     if whole and search.stop is not None:
         raise LimitReached([search.stop])
-    figures = search.figures
-    lower = max(search.bounds.lower, figures.success)
+    plan = search.best.plan("interrupted" if search.interrupted else "limit-reached", search.stop)
+    lower = max(search.bounds.lower, plan.figures.success)
     upper = max(search.bounds.upper, lower)
-    status: Status = "limit-reached"
-    if figures.success >= target:
-        status = "target-reached"
-    elif search.interrupted:
-        status = "interrupted"
-    elif upper < target:
+    status = plan.tree.status
+    if status == "limit-reached" and upper < target:
         status = "out-of-reach"
-    tree = Tree(task, search.root, figures.success, target, status, (lower, upper))
-    return Plan(tree, figures, initial.success, (), search.stop)
+    return replace(plan, tree=replace(plan.tree, status=status, bounds=(lower, upper)))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 
-from bbtc.belief.absorption import components
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import figures
 from bbtc.belief.soundness import violations
 from bbtc.belief.tick import Status
 from bbtc.diagnostics import LimitReached
+from bbtc.graph import components
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ControlNode, Node, actions_of

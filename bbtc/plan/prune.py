@@ -7,15 +7,18 @@ from dataclasses import replace
 from bbtc.belief.chain import Chain
 from bbtc.belief.tick import Status, compile_tick
 from bbtc.ground.task import Task
+from bbtc.limits import Limits
 from bbtc.tree.nodes import ControlNode, Node, actions_of
 
+_LOOK = 1024  # states between two looks at the clock
 
-def without_idle_branches(task: Task, root: Node, chain: Chain) -> Node:
+
+def without_idle_branches(task: Task, root: Node, chain: Chain, limits: Limits) -> Node:
     """The tree without those alternatives of Fallbacks that hold actions and only ever failed.
 
     In every state of the chain such a branch returns failure, and a Fallback goes on after it as
     if it were not there: statuses, started actions and probabilities stay as they are. The root
-    itself is returned where nothing was taken out.
+    itself is returned where nothing was taken out. Raises ``LimitReached`` when the time is over.
     """
     active: set[str] = set()
 
@@ -24,7 +27,9 @@ def without_idle_branches(task: Task, root: Node, chain: Chain) -> Node:
             active.add(node.id)
 
     tick = compile_tick(task, root, observe)
-    for state in chain.states:
+    for number, state in enumerate(chain.states):
+        if number % _LOOK == _LOOK - 1:
+            limits.check_time("the search for a small tree")
         tick(state.values, state.finished)
 
     def kept(node: Node) -> Node:

@@ -10,14 +10,13 @@ them is not tried there again; and there are limits on time, states and nodes.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
-from bbtc.belief.simulate import figures as chain_figures
-from bbtc.belief.simulate import simulate
 from bbtc.belief.state import Transition
 from bbtc.belief.tick import Status
 from bbtc.diagnostics import Diagnostic, LimitReached
@@ -26,14 +25,16 @@ from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.plan.best_tree import BestTree
 from bbtc.plan.choose import Candidate, Chooser, Target
 from bbtc.plan.draft import Draft, Subgoal, freeze, new_attempt
+from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.prune import without_idle_branches
 from bbtc.plan.result import Plan, Progress, Refinement
 from bbtc.plan.targets import Simulated, TargetFinder
 from bbtc.plan.threats import find_threat
 from bbtc.tree.nodes import Status as PlanStatus
-from bbtc.tree.nodes import Tree, walk
+from bbtc.tree.nodes import walk
 
 PATIENCE = 30
 """So many refinements may pass without progress before they are taken back."""
@@ -139,7 +140,9 @@ class _Refiner:
         )
 
 
-def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> Plan:
+def refine(
+    task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = DEFAULTS
+) -> Plan:
     """Plan by greedy refinement. Always returns: the target is reached, or nothing is left to
     insert (status ``stuck``), or a limit is reached; then the plan holds the best tree so far.
 
@@ -152,8 +155,8 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
     refinements: list[Refinement] = []
     status: PlanStatus = "stuck"
     stop: Diagnostic | None = None
+    kept = BestTree.start(task, target, options.best, freeze(refiner.draft, limits).root, limits)
     best = base = current = refiner.simulate()  # the base: where progress was last made
-    initial = current.success
     since_base: list[_Change] = []
 
     def tell(refinement: Refinement) -> None:
@@ -177,6 +180,7 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
             refiner.judge(change, before, current)
             if current.success > best.success:
                 best = current
+                kept.take(best.root, best.chain, best.success, tuple(refinements))
             if _progress(base, current, target):
                 base, since_base = current, []
             elif change.insertion is None and current.success < before.success:
@@ -186,11 +190,11 @@ def refine(task: Task, target: Fraction, limits: Limits, progress: Progress) -> 
         status, stop = "limit-reached", reached.diagnostics[0]
     except KeyboardInterrupt:
         status = "interrupted"
-    if best.success >= target:
-        status = "target-reached"
-    root = without_idle_branches(task, best.root, best.chain)
-    figures = simulate(task, root, limits) if root is not best.root else chain_figures(task, root, best.chain)
-    return Plan(Tree(task, root, best.success, target, status), figures, initial, tuple(refinements), stop)
+    with contextlib.suppress(LimitReached):
+        root = without_idle_branches(task, best.root, best.chain, limits)
+        if root is not best.root:
+            kept.take(root, explore(task, root, limits, transitions), best.success)
+    return replace(kept.plan(status, stop), refinements=tuple(refinements))
 
 
 def _progress(base: Simulated, now: Simulated, target: Fraction) -> bool:

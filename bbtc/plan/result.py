@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, Protocol, TypeAlias
 
+from bbtc.belief.chain import Chain
 from bbtc.belief.simulate import Figures
 from bbtc.diagnostics import Diagnostic
 from bbtc.ground.task import Task
@@ -47,13 +48,14 @@ Progress: TypeAlias = Callable[[Refinement], None]
 @dataclass(frozen=True, slots=True)
 class Plan:
     """A planner's answer. ``initial_success`` is the probability before any refinement; ``stop``
-    says which limit ended the search, if one did."""
+    says which limit ended the search, if one did. ``chain`` is that of the tree, where it is at hand."""
 
     tree: Tree
     figures: Figures
     initial_success: Fraction
     refinements: tuple[Refinement, ...]
     stop: Diagnostic | None = None
+    chain: Chain | None = field(default=None, compare=False, repr=False)
 
     def _repr_svg_(self) -> str:
         """The picture of the tree, for notebooks."""

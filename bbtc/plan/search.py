@@ -30,7 +30,6 @@ from itertools import count
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import FailureFinder
-from bbtc.belief.simulate import simulate
 from bbtc.belief.state import Transition, Values, compile_action
 from bbtc.belief.tick import Status
 from bbtc.diagnostics import Diagnostic, LimitReached
@@ -39,16 +38,16 @@ from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.plan.best_tree import BestTree
 from bbtc.plan.draft import Attempt, Draft, Frozen, Subgoal, freeze, new_attempt
 from bbtc.plan.options import DEFAULTS, Options
 from bbtc.plan.relaxed import possible
 from bbtc.plan.result import Plan, Progress, Refinement
 from bbtc.plan.search_moves import Insertion, Move, Moves, forward, separating
-from bbtc.plan.shrink import finished
+from bbtc.plan.shrink import GRACE, finish
 from bbtc.plan.simplify import size
 from bbtc.plan.space import explore_space
 from bbtc.plan.value import reachability
-from bbtc.tree.nodes import Node, Tree
 from bbtc.tree.nodes import Status as PlanStatus
 
 MOST_TREES = 400
@@ -101,6 +100,7 @@ class _Search:
     task: Task
     target: Fraction
     limits: Limits
+    best: BestTree
     moves: Moves = field(init=False)
     transitions: dict[str, Transition] = field(default_factory=dict)
     trees: int = 0
@@ -108,8 +108,6 @@ class _Search:
     known: set[tuple[object, ...]] = field(default_factory=set)
     heap: list[tuple[Fraction, int, int, int, _Open | tuple[_Open, _Seen]]] = field(default_factory=list)
     order: count[int] = field(default_factory=count)
-    best: _Seen | None = None
-    steps: tuple[Refinement, ...] = ()
 
     def run(self) -> None:
         """Search until the target is reached, nothing is left, or enough was tried."""
@@ -125,8 +123,8 @@ class _Search:
                 if entry.above is not None:
                     steps = (*steps, self.told(entry.above, entry.change, entry.values, seen))
                 entry = replace(entry, steps=steps)
-                if self.best is None or seen.success > self.best.success:
-                    self.best, self.steps = seen, steps
+                if seen.success > self.best.success:
+                    self.best.take(seen.frozen.root, seen.chain, seen.success, steps)
                 if seen.success >= self.target:
                     return
                 now = -min(seen.reachable, self.target)
@@ -323,11 +321,10 @@ def plan_search(
     the initial belief.
     """
     start = freeze(Draft.start(task), limits).root
-    initial = simulate(task, start, limits)
-    search = _Search(task, target, limits)
+    best = BestTree.start(task, target, options.best, start, limits)
+    search = _Search(task, target, limits, best)
     status: PlanStatus = "stuck"
     stop: Diagnostic | None = None
-    root: Node = start
     try:
         search.target = possible_target(task, target, limits)
         search.run()
@@ -335,18 +332,15 @@ def plan_search(
         status, stop = "limit-reached", reached.diagnostics[0]
     except KeyboardInterrupt:
         status = "interrupted"
-    if search.best is not None and search.best.success > initial.success:
-        root = search.best.frozen.root
+        limits = limits.within(GRACE)
+    if best.success > best.initial:
         try:
-            root = finished(task, root, target, limits, options, transitions=search.transitions)
+            finish(best, limits, options, transitions=search.transitions)
         except LimitReached as reached:
-            stop = reached.diagnostics[0]
+            stop = stop or reached.diagnostics[0]
         except KeyboardInterrupt:
             status = "interrupted"
-    figures = simulate(task, root, Limits())
-    if figures.success >= target:
-        status = "target-reached"
-    steps = search.steps if root is not start else ()
-    for step in steps:
+    plan = best.plan(status, stop)
+    for step in plan.refinements:
         progress(step)
-    return Plan(Tree(task, root, figures.success, target, status), figures, initial.success, steps, stop)
+    return plan

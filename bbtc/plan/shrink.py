@@ -8,16 +8,21 @@ from fractions import Fraction
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
+from bbtc.belief.simulate import success_of
 from bbtc.belief.soundness import violations
 from bbtc.belief.state import Transition
 from bbtc.belief.tick import Status
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.plan.best_tree import BestTree
 from bbtc.plan.options import Options
 from bbtc.plan.policy_retry import with_least_attempts
 from bbtc.plan.simplify import numbered, simplified, size
 from bbtc.tree.nodes import ControlNode, Node, actions_of
+
+GRACE = 0.5
+"""Seconds to make the most of what is known once the user interrupts."""
 
 _MOST_STATES = 50_000
 """States of all simulations together."""
@@ -97,20 +102,24 @@ def _without_one(node: Node) -> Iterator[Node]:
             yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))
 
 
-def finished(
-    task: Task,
-    root: Node,
-    target: Fraction,
-    limits: Limits,
-    options: Options,
-    *,
-    transitions: dict[str, Transition] | None = None,
-) -> Node:
-    """The tree without what its runs, or the target, do not need, and with as many attempts as the
-    options say. Raises ``LimitReached``."""
-    root = simplified(task, root, limits, transitions)
-    root = shrunk(task, root, target, limits, transitions)
-    worth = _Worth.of(explore(task, root, limits, transitions))
-    if options.retries == "least" and worth.success > target:
-        root = with_least_attempts(task, root, target, limits)
-    return numbered(root)
+def finish(
+    best: BestTree, limits: Limits, options: Options, *, transitions: dict[str, Transition] | None = None
+) -> None:
+    """Take from the best tree what its runs, or the target, do not need, and give it as many attempts as the
+    options say; what was done before a limit stays. Raises ``LimitReached``."""
+    task, target = best.task, best.target
+
+    def taken(root: Node) -> Node:
+        root = numbered(root)
+        chain = explore(task, root, limits, transitions)
+        best.take(root, chain, success_of(chain))
+        return root
+
+    root = taken(simplified(task, best.root, limits, transitions))
+    smaller = shrunk(task, root, target, limits, transitions)
+    if smaller is not root:
+        root = taken(smaller)
+    if options.retries == "least" and best.success > target:
+        retried = with_least_attempts(task, root, target, limits)
+        if retried is not root and size(retried) <= limits.nodes:
+            taken(retried)

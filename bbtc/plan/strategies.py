@@ -51,8 +51,5 @@ def run_strategy(
     unguarded = replace(options, guarded=False)
     if options.guarded:
         limits = replace(limits, nodes=max(1, limits.nodes - most_more(task)))
-    if name == "refine":
-        plan = strategy(task, target, limits, progress)
-    else:
-        plan = strategy(task, target, limits, progress, unguarded)
+    plan = strategy(task, target, limits, progress, unguarded)
     return guarded(plan, limits) if options.guarded else plan

@@ -86,7 +86,7 @@ class Learner:
         self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(offers.goal), len(self.literals))
         self.owner = np.repeat(np.arange(len(offers.goal)), np.diff(offers.first))
         self.taken = np.ones(len(offers.action), dtype=np.bool_)
-        self._own: dict[int, frozenset[Literal]] = {}
+        self._own: dict[int, npt.NDArray[np.float64]] = {}
 
     def relevant(self) -> Flags:
         """The states that runs may still visit."""
@@ -124,8 +124,10 @@ class Learner:
             able = np.zeros(len(self.offers.goal), dtype=np.bool_)
             able[self.owner[offers[self.offers.action[offers] == action]]] = True
             wanted, others = waiting[able[waiting]], np.concatenate([waiting[~able[waiting]], against])
-            if best is not None and len(wanted) / 1.0 < -best[0][0]:
-                continue  # even without any test it would not decide more for its size
+            # At best it decides all of them: with one test, or without any if there is nothing to tell apart.
+            at_best = (-len(wanted) / 3, 1) if len(others) else (-float(len(wanted)), 0)
+            if best is not None and best[0] <= at_best:
+                continue
             columns, covered = self._grow(action, wanted, others)
             size = len(columns) + 2 if columns else 1
             key = (-len(covered) / size, len(columns))
@@ -160,9 +162,9 @@ class Learner:
     def _own_literals(self, action: int) -> npt.NDArray[np.float64]:
         """1 for literals that the action's precondition states: they read best."""
         if action not in self._own:
-            self._own[action] = frozenset(_stated(self.task.actions[action].precondition))
-        own = self._own[action]
-        return np.array([float(literal in own) for literal in self.literals])
+            own = frozenset(_stated(self.task.actions[action].precondition))
+            self._own[action] = np.array([float(literal in own) for literal in self.literals])
+        return self._own[action]
 
 
 def _literals(values: npt.NDArray[np.uint8]) -> list[Literal]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
-from bbtc.belief.absorption import components
+from bbtc.graph import components
 from bbtc.limits import Limits
 
 Row: TypeAlias = dict[int, Fraction]

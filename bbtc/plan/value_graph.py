@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.belief.absorption import components
+from bbtc.graph import components
 from bbtc.plan.space import StateSpace, ranges
 from bbtc.plan.space_actions import Index
 from bbtc.plan.space_packing import Flags

@@ -26,6 +26,7 @@ EXAMPLE = re.compile(r"^## (Wrong|Right)\n\n```pddl\n(.*?)^```$", re.MULTILINE |
 WORDS_ALONE = {
     "BBT0408",
     "BBT0502",
+    "BBT0504",
     "BBT0613",
     "BBT0702",
     "BBT0703",

@@ -33,7 +33,7 @@ MOST_ACTIONS = 3
 
 
 def idle(of: Task, root: Node) -> Node:
-    return without_idle_branches(of, root, explore(of, root, Limits()))
+    return without_idle_branches(of, root, explore(of, root, Limits()), Limits())
 
 
 def simple(of: Task, root: Node) -> Node:
