@@ -48,8 +48,8 @@ class Session:
             self.line.erase()
 
     def say(self, text: str = "") -> None:
-        """A message for people, one line on stderr; silent where diagnostics are written for machines. Names in it
-        may come from strangers: what would steer a terminal is replaced."""
+        """A message for people, one line on stderr; silent where diagnostics are written for machines. Names
+        in it may come from strangers: what would steer a terminal is replaced."""
         from bbtc.export.names import printable
 
         if self.form == "text":
