@@ -203,7 +203,7 @@ def block_line(block: Block, whose: str = "") -> str:
         lead = {Truth.TRUE: "", Truth.FALSE: "not ", Truth.UNKNOWN: "unknown "}[block.value]
         return (
             f"{needing} needs {lead}{block.fact}, and no action{whose} brings it back: "
-            f"{listed}{more} cannot without it"
+            f"{listed}{more} can never do so"
         )
     if block.value is Truth.UNKNOWN:
         return f"{needing} needs {block.fact} to be unknown, and no action{whose} makes it that"

@@ -164,9 +164,7 @@ def _fact_told(reached: Reach, missing: Missing, fact: Fact) -> str:
         return f"{start} needs `{name}` to be unknown, and nothing makes it so"
     if missing.setters:
         listed = ", ".join(f"`{each}`" for each in missing.setters[:_MOST_NAMED])
-        return (
-            f"only {listed} can make `{name}` {value.word}, and cannot without it: is it missing in `:init`?"
-        )
+        return f"only {listed} could make `{name}` {value.word}, and never can: is it missing in `:init`?"
     if model.predicates[fact.predicate].derived:
         return f"no rule ever makes `{name}` {value.word}"
     needs = f"`{by}` needs `{name}`" + (" to be false" if value is Truth.FALSE else "")

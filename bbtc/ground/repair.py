@@ -22,7 +22,9 @@ _MOST_FACTS = 2000
 _Cost: TypeAlias = tuple[int, float]
 """Whether a fact has to be given that something could bring about, and what all else takes. Several parts
 that need one have mostly the same in mind: it counts once."""
-_GIVEN: _Cost = (1, 2.5)
+_GIVEN: _Cost = (1, 0.0)
+_DEEPER: _Cost = (1, 2.5)
+"""A way down is told rather than that a fact on it should be given, if it takes no more than this."""
 _NEVER: _Cost = (2, 0.0)
 
 
@@ -54,7 +56,7 @@ class Way(Generic[F]):
 @dataclass(frozen=True, slots=True)
 class Root(Generic[F]):
     """A fact that is missing, and what needs it (None: what was asked for itself). ``setters`` could bring it
-    about, but need it themselves."""
+    about, but are out of reach themselves, mostly for want of it."""
 
     what: F
     by: str | None
@@ -154,7 +156,7 @@ class Repairs(Generic[F]):
             if not circle:
                 above[each] = parent
                 needed_by[each] = by
-                if best is not None and self._cost(best.need) <= self._costs[each]:
+                if best is not None and self._cost(best.need) <= max(self._costs[each], _DEEPER):
                     todo.append((best.need, best.by, each))
                     continue
             if each not in told:

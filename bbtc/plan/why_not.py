@@ -33,7 +33,7 @@ from bbtc.tree.nodes import Tree
 class Block:
     """A fact that nothing brings back: ``fact`` would have to have ``value``, but is ``now`` something else.
     ``action`` (None: the goal itself) needs it, and stands at ``span``. Without ``setters`` no action at all
-    brings it about; those could, but need it themselves on their way."""
+    brings it about; those could, but are out of reach themselves, mostly for want of it."""
 
     fact: str
     value: Truth

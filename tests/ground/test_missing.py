@@ -61,7 +61,7 @@ def test_a_goal_within_reach_lacks_nothing() -> None:
 @pytest.mark.parametrize(
     ("forgotten", "told"),
     [
-        ("(at hall)", "only `go` can make `at(hall)` true, and cannot without it: is it missing in `:init`?"),
+        ("(at hall)", "only `go` could make `at(hall)` true, and never can: is it missing in `:init`?"),
         (
             "(linked hall lab)",
             "`go` needs `linked(?a,lab)`, and no action makes it so, nor does `:init` give it",

@@ -113,7 +113,7 @@ def test_a_blocked_run_names_the_empty_battery_and_not_the_fact_it_never_came_to
     file = tmp_path / "hospital.pddl"
     file.write_text(HOSPITAL.replace("GOAL", "(or (delivered) (not (nurse-in ward-1)))"))
     done = bbtc("plan", str(file), "-o", str(tmp_path / "tree.json"), "-q")
-    battery = "needs charged(), and no action brings it back: charge() cannot without it"
+    battery = "needs charged(), and no action brings it back: charge() can never do so"
     assert done.err.replace(f"{tmp_path}/", "").splitlines()[-3:] == [
         f"    drive(hall,ward-1) [hospital.pddl:8:3] {battery}",
         "    most probably so:",
@@ -251,6 +251,36 @@ def test_the_fact_that_a_circle_comes_back_to_is_the_root() -> None:
 def test_two_things_lost_are_both_told() -> None:
     of = task("a b won", {}, Is(2, T), action("win", _both(0, 1), ("1", {2: T})))
     assert [block.fact for block in RootFinder(of, Limits()).blocks(bytes([F, F, F]))] == ["a()", "b()"]
+
+
+def test_what_two_needs_have_in_common_is_told_once_at_its_root() -> None:
+    """Both parts come from the battery, which is empty far from its charger."""
+    of = task(
+        "full there a b m won",
+        {},
+        Is(5, T),
+        action("go", Is(0, T), ("1", {1: T})),
+        action("charge", Is(1, T), ("1", {0: T})),
+        action("get-a", Is(0, T), ("1", {2: T})),
+        action("get-b", Is(0, T), ("1", {3: T})),
+        action("make", _both(2, 3), ("1", {4: T})),
+        action("win", Is(4, T), ("1", {5: T})),
+    )
+    (block,) = RootFinder(of, Limits()).blocks(bytes([F] * 6))
+    assert (block.fact, block.action, block.setters) == ("full()", "get-a()", ("charge()",))
+
+
+def test_a_circle_and_a_fact_that_nobody_sets_are_both_told() -> None:
+    of = task(
+        "full there lost m won",
+        {},
+        Is(4, T),
+        action("go", Is(0, T), ("1", {1: T})),
+        action("charge", Is(1, T), ("1", {0: T})),
+        action("make", _both(0, 2), ("1", {3: T})),
+        action("win", Is(3, T), ("1", {4: T})),
+    )
+    assert [block.fact for block in RootFinder(of, Limits()).blocks(bytes([F] * 5))] == ["lost()", "full()"]
 
 
 def test_of_two_ways_the_one_that_lacks_less_is_told() -> None:
