@@ -68,11 +68,6 @@ class Session:
     def say(self, text: str = "") -> None:
         """A message for people, one line on stderr; silent where diagnostics are written for machines. Names
         in it may come from strangers: what would steer a terminal is replaced."""
-<<<<<<< HEAD
-=======
-        from bbtc.export.names import printable
-
->>>>>>> models
         if self.form == "text":
             self.clear()
             tell(printable(text))

@@ -49,7 +49,6 @@ from bbtc.ground.task import (
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.tree.deep import Deep, unwind
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, tree_depth
 from bbtc.tree.validate import MAX_DEPTH
 
@@ -180,6 +179,7 @@ class _Freezer:
         self.draft = draft
         self.limits = limits
         self.nodes = 0
+        self.calls = self.controls = 0  # how deep in the bodies of templates
         self.task = draft.task
         self.owners: dict[str, Owner] = {}
         self.actions: dict[str, Attempt] = {}
@@ -247,7 +247,7 @@ class _Freezer:
             case GroundAction():
                 return [self.action(attempt, "action", attempt.doing.name, guarded=False)]
             case GroundTemplate():
-                return [unwind(self.template(attempt, "body", attempt.doing))]
+                return [self.template(attempt, "body", attempt.doing)]
             case _:
                 assert_never(attempt.doing)
 
@@ -258,19 +258,27 @@ class _Freezer:
         self.owners[node.id] = Owner(None, attempt)
         return node
 
-    def template(self, attempt: Attempt, role: str, template: GroundTemplate) -> Deep[Node]:
-        body: Node = yield self.body(attempt, role, template.body)
+    def template(self, attempt: Attempt, role: str, template: GroundTemplate) -> Node:
+        self.calls += 1
+        if self.calls > MAX_DEPTH:
+            raise _too_deep()
+        body = self.body(attempt, role, template.body)
+        self.calls -= 1
         if isinstance(body, ControlNode) and body.template is None:
             return ControlNode(body.id, body.kind, body.children, template=template.name)
         # A body of one leaf, or of one call: the template still shows as a node of its own.
         return ControlNode(self.id(attempt.ids, f"{role}.call"), "sequence", (body,), template=template.name)
 
-    def body(self, attempt: Attempt, role: str, body: Body) -> Deep[Node]:
+    def body(self, attempt: Attempt, role: str, body: Body) -> Node:
         match body:
             case BodyControl():
+                self.controls += 1
+                if self.controls > MAX_DEPTH:
+                    raise _too_deep()
                 children: list[Node] = []
-                for position, child in enumerate(body.children):
-                    children.append((yield self.body(attempt, f"{role}.{position}", child)))
+                for position, child in enumerate(body.children):  # a loop: few frames for each level
+                    children.append(self.body(attempt, f"{role}.{position}", child))
+                self.controls -= 1
                 return ControlNode(self.id(attempt.ids, role), body.kind, tuple(children))
             case BodyCondition():
                 node = ConditionNode(self.id(attempt.ids, role), body.condition)
@@ -281,10 +289,14 @@ class _Freezer:
                 guarded = bool(conjuncts(action.precondition))
                 return self.action(attempt, role, action.name, guarded=guarded)
             case BodyTemplate():
-                called: Node = yield self.template(attempt, role, self.task.template_by_name[body.template])
-                return called
+                return self.template(attempt, role, self.task.template_by_name[body.template])
             case _:
                 assert_never(body)
+
+
+def _too_deep() -> LimitReached:
+    message = f"a tree has at most {MAX_DEPTH} levels, which ended planning"
+    return LimitReached([Diagnostic("BBT0504", message, hint="another strategy may need fewer")])
 
 
 def _implied(condition: Condition, subgoal: Subgoal, *, sensing: bool) -> bool:
@@ -316,6 +328,5 @@ def freeze(draft: Draft, limits: Limits) -> Frozen:
     goals = [freezer.subgoal(goal) for goal in draft.goals]
     root = freezer.control(draft.ids, "sequence", "root", goals)
     if tree_depth(root) > MAX_DEPTH:
-        message = f"a tree has at most {MAX_DEPTH} levels, which ended planning"
-        raise LimitReached([Diagnostic("BBT0504", message, hint="another strategy may need fewer")])
+        raise _too_deep()
     return Frozen(root, freezer.owners, freezer.actions)

@@ -86,11 +86,11 @@ def steps_backwards(count: int) -> str:
 def test_time_grows_as_the_input_does(tmp_path: Path, text: Callable[[int], str], count: int) -> None:
     file = tmp_path / "large.pddl"
     file.write_text(text(count))
-    commands: tuple[list[str | Path], ...] = (
+    commands: list[list[str | Path]] = [
         ["check", file],
         ["fmt", "--check", file],
         ["compile", file, "-o", tmp_path / "task.json"],
-    )
+    ]
     for command in commands:
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         run(*command, statuses=(0, 1) if command[0] == "fmt" else (0,))

@@ -13,13 +13,8 @@ from bbtc.cli.commands import cli
 from bbtc.diagnostics import Severity
 from bbtc.source import SourceFile
 
-<<<<<<< HEAD
-# A courier crosses once; what that costs and earns besides the 2 of the way is `{}`. All it may depend on can
-# change, but too late.
-=======
 # A courier crosses once; what that costs and earns besides the 2 of the way is `{}`. All that it may depend
 # on can change, but too late.
->>>>>>> models
 COURIER = """(define (domain courier)
   (:requirements :typing :mdp :rewards :action-costs :conditional-effects :probabilistic-effects
     :non-deterministic :negative-preconditions :universal-effects :unknown)
