@@ -348,6 +348,8 @@ def _difference(path: str, old: str, new: str) -> tuple[str, tuple[str, ...]]:
     first = next(number for number, (one, other) in enumerate(pairs) if one != other)
     if max(len(bare), len(wanted)) - first > _MOST_COMPARED:
         return f", first in line {first + 1}", ()
+    if bare[-1] == wanted[-1] == "":  # both end with a line end: no empty line follows it
+        bare, wanted = bare[:-1], wanted[:-1]
     shown = printable(path)
     diff = difflib.unified_diff(bare, wanted, shown, f"{shown} (as it would be)", lineterm="")
     return ":", tuple(diff)
