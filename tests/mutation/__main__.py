@@ -91,6 +91,8 @@ def report(
     killed = len(found) - len(survivors)
     open_ = [each for each in survivors if each.mutant.key not in equivalent]
     lines = [f"{killed} of {len(found)} mutants killed ({killed / max(1, len(found)):.1%})"]
+    # On a busy machine a survivor may look like one: they are named.
+    lines.extend(f"only by the time limit: {named(each.mutant)}" for each in found if each.fate == "timeout")
     for each in survivors:
         why = equivalent.get(each.mutant.key)
         lines.append(f"survived{'' if why is None else ', equivalent'}: {named(each.mutant)}")
