@@ -184,6 +184,7 @@ def run_planner(
         signals.hold()
         session.watch.off()
 
+    limits.tell("planning")
     plan = plan_task(
         task,
         target,

@@ -150,12 +150,12 @@ def test_a_plan_of_hundreds_of_steps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("count", [300, 1000])
 def test_a_chain_that_no_tree_of_refinements_can_hold(tmp_path: Path, count: int) -> None:
-    """Refinement goes a level down with each step: it ends with what it has."""
+    """Greedy refinement does not get there: it ends with what it has, by a limit or as it knows no more."""
     file, made = tmp_path / "corridor.pddl", tmp_path / "tree.json"
     file.write_text(corridor(count))
     run("plan", file, "-q", "--strategy", "refine", "--time-limit", "3", "-o", made, statuses=(3,))
     if made.exists():  # unless the time was over before there was anything to plan for
-        assert bbtc.load_tree(made).status == "limit-reached"
+        assert bbtc.load_tree(made).status in {"limit-reached", "stuck"}
 
 
 def nested(depth: int) -> str:
