@@ -289,7 +289,8 @@ class _Freezer:
                 guarded = bool(conjuncts(action.precondition))
                 return self.action(attempt, role, action.name, guarded=guarded)
             case BodyTemplate():
-                return self.template(attempt, role, self.task.template_by_name[body.template])
+                # A role of its own: both templates may show as nodes of their own.
+                return self.template(attempt, f"{role}.called", self.task.template_by_name[body.template])
             case _:
                 assert_never(body)
 

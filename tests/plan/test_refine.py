@@ -20,6 +20,7 @@ from bbtc.plan.refine import refine
 from bbtc.plan.result import Plan
 from bbtc.tree.nodes import ActionNode, walk
 from bbtc.tree.validate import check_tree
+from tests.ground.examples import task_of
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -119,6 +120,19 @@ def test_a_guard_of_an_effect_becomes_a_precondition() -> None:
     )
     done = plan(task("on power", {}, Is(0, T), press, action("plug", Is(1, F), ("1", {1: T}))), "1")
     assert (done.tree.status, done.tree.success_probability) == ("target-reached", 1)
+
+
+def test_every_template_that_only_calls_another_one_shows_as_a_node_of_its_own() -> None:
+    of = task_of("""(define (domain lamp) (:predicates (lit))
+      (:action press :precondition (not (lit)) :effect (lit))
+      (:template inner :body (press))
+      (:template middle :body (inner))
+      (:template outer :precondition (not (lit)) :effect (lit) :body (middle)))
+    (define (problem dark) (:domain lamp) (:init) (:goal (lit)))""")
+    tree = plan(of, "1").tree
+    check_tree(tree)
+    assert tree.success_probability == 1
+    assert [node.template for node in walk(tree.root) if node.template] == ["outer()", "middle()", "inner()"]
 
 
 @pytest.mark.parametrize(
