@@ -2,30 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Iterable, Mapping
+from enum import Enum
 from functools import cached_property
+from typing import TypeAlias
 
-from bbtc.ground.condition import FALSE, TRUE, Condition, Is, Known
+from typing_extensions import assert_never
+
+from bbtc.ground.condition import FALSE, TRUE, And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.reach import Reach
-from bbtc.ground.task import Variable
+from bbtc.ground.task import Variable, ground_name
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 
 _VALUES = (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN)
+_ONLY_FALSE = (Truth.FALSE,)
 
-Leaves = dict[Row, Condition]
 Pair = tuple[int, Truth]
 """A variable and the value that it is set to."""
+Key: TypeAlias = tuple[str, Row]
+"""Predicate and arguments of a ground atom."""
+
+
+class Scope(Enum):
+    """Where a ground condition must have the value that the text gives it."""
+
+    WORLD = "in every state, whatever others change"
+    MODEL = "in the states that the model may reach"
+    TRUTH = "there, and only as to whether it is true"
+
+
+class Leaves(dict[Row, Condition]):
+    """The condition that an atom has a value, by the atom's arguments; ``other`` stands for those that are
+    not listed."""
+
+    def __init__(self, leaves: Iterable[tuple[Row, Condition]], other: Condition) -> None:
+        super().__init__(leaves)
+        self.other = other
+
+    def __missing__(self, row: Row) -> Condition:
+        return self.other
+
+
+class OpenLeaves(Leaves):
+    """Leaves of a predicate that others may change: an atom gets a variable when it is asked for."""
+
+    def __init__(
+        self, leaves: Iterable[tuple[Row, Condition]], other: Condition, make: Callable[[Row], Condition]
+    ) -> None:
+        super().__init__(leaves, other)
+        self._make = make
+
+    def __missing__(self, row: Row) -> Condition:
+        leaf = self[row] = self._make(row)
+        return leaf
 
 
 class Atoms:
-    """Ground atoms: those that can change, or stay unknown, are variables; others are constants.
+    """Ground atoms. Those that can change in the model, or stay unknown, are variables (``numbers``); so
+    are those that only others can change, once a condition asks for them (``steady``, which no effect sets).
+    The rest are constants.
 
     Leaves are made once and shared, and so are the pairs that effects set.
     """
 
-    def __init__(self, reach: Reach, keep: Collection[tuple[str, Row]] | None = None) -> None:
-        """Only variables in ``keep`` are kept, if given: then no condition may read another."""
+    def __init__(self, reach: Reach, keep: Collection[Key] | None = None) -> None:
+        """Only variables in ``keep`` are kept, if given: then no condition may read another in the end."""
         self.reach = reach
         self.model = reach.usage.model
         self.universe = reach.universe
@@ -34,14 +76,23 @@ class Atoms:
             for name in self.model.predicates
             if name not in reach.usage.derived
         }
-        self.keys = self._sorted_variables()
+        changing = {name: self._changing(name) for name in self._possible}
+        steady: dict[str, set[Row]] = {}
+        for name, row in () if keep is None else keep:
+            if not self._changes(name, row):
+                steady.setdefault(name, set()).add(row)
         if keep is not None:
-            self.keys = [key for key in self.keys if key in keep]
+            changing = {name: [row for row in rows if (name, row) in keep] for name, rows in changing.items()}
+        self.keys = self._sorted({name: [*rows, *steady.get(name, ())] for name, rows in changing.items()})
         self.numbers: dict[str, dict[Row, int]] = {name: {} for name in self.model.predicates}
-        for number, (predicate, row) in enumerate(self.keys):
-            self.numbers[predicate][row] = number
-        self._tables: dict[tuple[str, Truth | None, bool], Leaves] = {}
+        self.steady: dict[str, dict[Row, int]] = {name: {} for name in self.model.predicates}
+        for number, (name, row) in enumerate(self.keys):
+            numbers = self.steady if steady and row in steady.get(name, ()) else self.numbers
+            numbers[name][row] = number
+        self._kept = None if keep is None else len(self.keys)
+        self._tables: dict[tuple[str, Truth | None, Scope], Leaves] = {}
         self._is: dict[Truth, list[Is]] = {}
+        self._well_typed: dict[str, list[frozenset[int]]] = {}
 
     @cached_property
     def pairs(self) -> dict[Truth, list[Pair]]:
@@ -59,50 +110,81 @@ class Atoms:
             for row in (true | unknown if unknown else true)
         }
 
-    def _sorted_variables(self) -> list[tuple[str, Row]]:
-        keys = [
-            (predicate, row)
-            for predicate in sorted(self._possible, key=lambda name: f"{name}(")
-            for row, values in sorted(self._possible[predicate].items())
-            if len(values) > 1 or values[0] is Truth.UNKNOWN
-        ]
+    def _changing(self, predicate: str) -> list[Row]:
+        possible = self._possible[predicate].items()
+        return [row for row, values in possible if len(values) > 1 or values[0] is Truth.UNKNOWN]
+
+    def _changes(self, predicate: str, row: Row) -> bool:
+        values = self._possible[predicate].get(row, _ONLY_FALSE)
+        return len(values) > 1 or values[0] is Truth.UNKNOWN
+
+    def _sorted(self, rows: Mapping[str, Iterable[Row]]) -> list[Key]:
+        """The keys of some rows of each predicate, sorted by name."""
+        names = sorted(rows, key=lambda name: f"{name}(")
+        keys = [(name, row) for name in names for row in sorted(rows[name])]
         if not self.universe.sorts_like_names:
-            keys.sort(key=lambda key: f"{key[0]}({','.join(self.universe.args(key[1]))})")
+            keys.sort(key=self._name)
         return keys
 
+    def _name(self, key: Key) -> str:
+        return ground_name(key[0], self.universe.args(key[1]))
+
+    def order(self) -> list[int]:
+        """The numbers of the variables to keep, sorted by name; in ``keys``, those that a condition asked for
+        stand last."""
+        if self._kept is not None:
+            return list(range(self._kept))
+        rows: dict[str, list[Row]] = {}
+        for name, row in self.keys:
+            rows.setdefault(name, []).append(row)
+        number = {key: index for index, key in enumerate(self.keys)}
+        return [number[key] for key in self._sorted(rows)]
+
     def variables(self) -> tuple[Variable, ...]:
-        """The variables of the task, sorted by name."""
+        """The variables of the task, by number."""
         spans = {(fact.predicate, fact.args): fact.span for fact in self.model.init.facts}
         made = []
-        for predicate, row in self.keys:
+        for name, row in self.keys:
             args = self.universe.args(row)
-            unknown = Truth.UNKNOWN in self._possible[predicate][row]
-            span = spans.get((predicate, args)) or self.model.predicates[predicate].span
-            made.append(Variable(predicate, args, unknown, span=span))
+            span = spans.get((name, args)) or self.model.predicates[name].span
+            made.append(Variable(name, args, self._unknowable(name, row), span=span))
         return tuple(made)
 
-    def leaves(self, predicate: str, value: Truth | None, *, strict: bool) -> tuple[Leaves, Condition]:
+    def _unknowable(self, predicate: str, row: Row) -> bool:
+        """Whether the atom may be unknown: in the model, or if others may change it and its predicate may be."""
+        if Truth.UNKNOWN in self._possible[predicate].get(row, _ONLY_FALSE):
+            return True
+        return predicate in self.reach.usage.open and self.model.predicates[predicate].three_valued
+
+    # --- leaves ------------------------------------------------------------------------------
+
+    def leaves(self, predicate: str, value: Truth | None, scope: Scope) -> Leaves:
         """The condition that an atom has the value (None: is known), for every atom that may be
         something else than false, and the condition for all others.
 
         It is constant where it is always or never so, also of an atom whose variable is not kept.
-        Where only truth matters (``strict``), a literal that can never be true is false, even if it
-        can be unknown.
+        Where only truth matters, a literal that can never be true is false, even if it can be unknown.
         """
-        key = (predicate, value, strict)
+        key = (predicate, value, scope)
         if key not in self._tables:
-            numbers = self.numbers[predicate]
-            if value is not None and value not in self._is:
-                self._is[value] = [Is(number, value) for number in range(len(self.keys))]
-            leaves = (
-                (row, self._leaf(numbers.get(row), values, value, strict))
-                for row, values in self._possible[predicate].items()
-            )
-            self._tables[key] = {row: leaf for row, leaf in leaves if leaf is not None}
-        return self._tables[key], TRUE if value in {Truth.FALSE, None} else FALSE
+            self._tables[key] = self._table(predicate, value, scope)
+        return self._tables[key]
+
+    def _table(self, predicate: str, value: Truth | None, scope: Scope) -> Leaves:
+        numbers, other = self.numbers[predicate], TRUE if value in {Truth.FALSE, None} else FALSE
+        if value is not None and value not in self._is:
+            self._is[value] = [Is(number, value) for number in range(len(self.keys))]
+        if scope is Scope.WORLD and predicate in self.reach.usage.open:
+            known = ((row, self._open_leaf(predicate, number, value)) for row, number in numbers.items())
+            return OpenLeaves(known, other, lambda row: self._asked(predicate, row, value, other))
+        leaves = (
+            (row, self._leaf(numbers.get(row), values, value, strict=scope is Scope.TRUTH))
+            for row, values in self._possible[predicate].items()
+        )
+        return Leaves(((row, leaf) for row, leaf in leaves if leaf is not None), other)
 
     def _leaf(
-        self, number: int | None, values: tuple[Truth, ...], value: Truth | None, strict: bool
+        self, number: int | None, values: tuple[Truth, ...], value: Truth | None, *, strict: bool
     ) -> Condition | None:
         """None where the variable matters and is not kept."""
         if value is None:
@@ -117,3 +199,59 @@ class Atoms:
         if value not in values and (strict or value is Truth.UNKNOWN or Truth.UNKNOWN not in values):
             return FALSE
         return None if number is None else self._is[value][number]
+
+    def _open_leaf(self, predicate: str, number: int, value: Truth | None) -> Condition:
+        if value is Truth.TRUE or value is Truth.FALSE:
+            return self._is[value][number]
+        if not self._unknowable(predicate, self.keys[number][1]):
+            return TRUE if value is None else FALSE
+        return Known(number) if value is None else self._is[value][number]
+
+    def _asked(self, predicate: str, row: Row, value: Truth | None, other: Condition) -> Condition:
+        """The leaf of an atom that the model never changes. One that is never unknown need not be read for it."""
+        if value in {Truth.UNKNOWN, None} and not self._unknowable(predicate, row):
+            return other
+        number = self.number(predicate, row)
+        return other if number is None else self._open_leaf(predicate, number, value)
+
+    def number(self, predicate: str, row: Row) -> int | None:
+        """The variable that a condition reads for an atom; None for a constant. An atom that only others can
+        change gets one here, but for arguments of other types than the predicate's."""
+        found = self.numbers[predicate].get(row)
+        if found is not None or predicate not in self.reach.usage.open:
+            return found
+        steady = self.steady[predicate]
+        if row not in steady and self._fits(predicate, row):
+            steady[row] = len(self.keys)
+            self.keys.append((predicate, row))
+            for value, leaves in self._is.items():
+                leaves.append(Is(steady[row], value))
+        return steady.get(row)
+
+    def _fits(self, predicate: str, row: Row) -> bool:
+        if row in self._possible[predicate]:
+            return True
+        if predicate not in self._well_typed:
+            parameters = self.model.predicates[predicate].parameters
+            self._well_typed[predicate] = [frozenset(self.universe.members(p.types)) for p in parameters]
+        return all(number in fits for number, fits in zip(row, self._well_typed[predicate], strict=True))
+
+    def can_be_true(self, condition: Condition) -> bool:
+        """Whether a condition in negation normal form may be true in the model, as far as its leaves tell."""
+        match condition:
+            case Is(number, value):
+                name, row = self.keys[number]
+                return value in self._possible[name].get(row, _ONLY_FALSE)
+            case Known(number):
+                name, row = self.keys[number]
+                return self._possible[name].get(row, _ONLY_FALSE) != (Truth.UNKNOWN,)
+            case And(parts):
+                return all(map(self.can_be_true, parts))
+            case Or(parts):
+                return any(map(self.can_be_true, parts))
+            case Constant(value):
+                return value
+            case Not():
+                raise AssertionError("not in normal form")
+            case _:
+                assert_never(condition)

@@ -260,11 +260,15 @@ def test_the_guards_of_an_action_kept_early_matter_when_their_effect_turns_out_t
 def test_quantifiers_side_by_side_may_use_one_name() -> None:
     task = task_of(
         """(define (domain d) (:predicates (p ?x) (q ?x) (done)) (:constants a b)
-          (:action set :effect (and (p a) (q b)))
+          (:action set :effect (and (when (p b) (q a)) (p a) (q b)))
           (:action end :precondition (and (exists (?x) (p ?x)) (exists (?x) (q ?x))) :effect (done)))
         (define (problem x) (:domain d) (:init) (:goal (done)))"""
     )
-    assert describe(task, task.action_by_name["end()"].precondition) == "(p(a) and q(b))"
+    # p(b) and q(a) are never true here, but others may make them so.
+    precondition = task.action_by_name["end()"].precondition
+    assert describe(task, precondition) == "((p(a) or p(b)) and (q(a) or q(b)))"
+    (outcome,) = task.action_by_name["set()"].factors[0].outcomes
+    assert [effect.when for effect in outcome.effects] == [None]
 
 
 def test_a_quantifier_two_levels_down_may_use_a_name_from_outside() -> None:

@@ -40,8 +40,8 @@ class Robot(Protocol):
     def is_in(self, room: str) -> bool:
         """Whether in(room) holds."""
 
-    def locked(self, door: str) -> bool:
-        """Whether locked(door) holds."""
+    def locked(self, door: str) -> bool | None:
+        """Whether locked(door) holds; None where that is unknown."""
 
     def call_control_room(self, door: str) -> Status:
         """Start or continue call_control_room(door)."""
@@ -438,8 +438,8 @@ class SimulatedWorld(World):
     def is_in(self, room: str) -> bool:
         return self._value("in", room) is True
 
-    def locked(self, door: str) -> bool:
-        return self._value("locked", door) is True
+    def locked(self, door: str) -> bool | None:
+        return self._value("locked", door)
 
     def call_control_room(self, door: str) -> Status:
         return self._act("call_control_room", door)
