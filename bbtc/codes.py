@@ -53,6 +53,7 @@ CODES: dict[str, str] = {
     "BBT0224": "foreach without a node around it",
     "BBT0225": "name that is not declared",
     "BBT0226": "section given twice",
+    "BBT0229": "derived predicate is external",
     # 03xx: checks
     "BBT0301": "unused predicate",
     "BBT0302": "unreachable action",
@@ -65,6 +66,7 @@ CODES: dict[str, str] = {
     "BBT0309": "unused parameter",
     "BBT0310": "unused template",
     "BBT0311": "requirements that do not match the content",
+    "BBT0313": "condition that only others can make true",
     # 04xx: grounding
     "BBT0403": "too many initial states",
     "BBT0404": "oneof in the initial state",

@@ -40,7 +40,9 @@ def _achievers(model: md.Model, part: mf.Formula) -> str | None:
         )
     ]
     if not setters:
-        return f"no action makes `{atom.predicate}` {value.word}"
+        external = model.predicates[atom.predicate].external
+        more = ", and it is planned for as if others left it as `:init` says" if external else ""
+        return f"no action makes `{atom.predicate}` {value.word}{more}"
     listed = ", ".join(setters[:5])
     return (
         f"only {listed} could, but cannot apply, or not to these objects: `bbtc check` may tell "

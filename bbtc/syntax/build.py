@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from bbtc.kleene import Truth
@@ -197,6 +198,10 @@ class Builder:
     def predicate_unknown(self, children: list[Any]) -> ast.PredicateDeclaration:
         unknown, head, parameters, _, close = children
         return ast.PredicateDeclaration(_head_name(head), parameters, True, between(unknown, close))
+
+    def external(self, children: list[Any]) -> ast.PredicateDeclaration:
+        word, predicate, close = children
+        return replace(predicate, external=True, span=between(word, close))
 
     def functions(self, children: list[Any]) -> ast.Functions:
         return ast.Functions(tuple(children[1:-1]), between(children[0], children[-1]))
