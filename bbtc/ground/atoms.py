@@ -151,7 +151,7 @@ class Atoms:
         return tuple(made)
 
     def _unknowable(self, predicate: str, row: Row) -> bool:
-        """Whether the atom may be unknown: in the model, or if others may change it and its predicate may be."""
+        """Whether the atom may be unknown: in the model, or by others where its predicate may be."""
         if Truth.UNKNOWN in self._possible[predicate].get(row, _ONLY_FALSE):
             return True
         return predicate in self.reach.usage.open and self.model.predicates[predicate].three_valued
@@ -208,7 +208,7 @@ class Atoms:
         return Known(number) if value is None else self._is[value][number]
 
     def _asked(self, predicate: str, row: Row, value: Truth | None, other: Condition) -> Condition:
-        """The leaf of an atom that the model never changes. One that is never unknown need not be read for it."""
+        """The leaf of an atom that the model never changes."""
         if value in {Truth.UNKNOWN, None} and not self._unknowable(predicate, row):
             return other
         number = self.number(predicate, row)

@@ -65,8 +65,8 @@ class Usage:
         return Truth.UNKNOWN in self.set_values.get(predicate, ()) or bool(self.start.unknown.get(predicate))
 
     def _only_reading(self, base: set[str]) -> set[str]:
-        """Derived predicates that only read, all the way down, predicates of ``base``. Where these are certain
-        and never change, so are they: ``unchanging`` in the model, ``fixed`` whatever others do."""
+        """Derived predicates that only read, all the way down, predicates of ``base``. Where these are
+        certain and never change, so are they: ``unchanging`` in the model, ``fixed`` whatever others do."""
         found = set(self.derived)
         shrunk = True
         while shrunk:

@@ -200,8 +200,8 @@ class Builder:
         return ast.PredicateDeclaration(_head_name(head), parameters, True, between(unknown, close))
 
     def external(self, children: list[Any]) -> ast.PredicateDeclaration:
-        word, predicate, close = children
-        return replace(predicate, external=True, span=between(word, close))
+        predicate: ast.PredicateDeclaration = children[1]
+        return replace(predicate, external=True, span=between(children[0], children[2]))
 
     def functions(self, children: list[Any]) -> ast.Functions:
         return ast.Functions(tuple(children[1:-1]), between(children[0], children[-1]))

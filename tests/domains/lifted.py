@@ -75,6 +75,8 @@ class Lifted:
 
     types: dict[str, set[str]] = field(default_factory=dict)
     objects: dict[str, set[str]] = field(default_factory=dict)
+    predicates: dict[str, dict[str, set[str]]] = field(default_factory=dict)
+    external: set[str] = field(default_factory=set)
     functions: set[str] = field(default_factory=set)
     actions: list[dict[str, Form]] = field(default_factory=list)
     rules: list[tuple[Form, dict[str, set[str]], Form]] = field(default_factory=list)
@@ -92,10 +94,15 @@ class Lifted:
                     self.types.update(typed(rest))
                 case ":constants" | ":objects":
                     self.objects.update(typed(rest))
+                case ":predicates":
+                    for each in rest:
+                        self.external.update([each[1][0]] if each[0] == "external" else [])
+                        name, *parameters = each[1] if each[0] == "external" else each
+                        self.predicates[name] = typed(parameters)
                 case ":functions":
                     self.functions.update(function[0] for function in rest)
                 case ":action":
-                    self.actions.append(_fields(rest[1:]))
+                    self.actions.append({":name": rest[0], **_fields(rest[1:])})
                 case ":derived":
                     name, *parameters = rest[0]
                     self.rules.append(([name, *typed(parameters)], typed(parameters), rest[1]))
