@@ -17,6 +17,7 @@ from bbtc.kleene import Truth
 
 _VALUES = (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN)
 _ONLY_FALSE = (Truth.FALSE,)
+_NO_NUMBER = -1
 
 Pair = tuple[int, Truth]
 """A variable and the value that it is set to."""
@@ -163,7 +164,8 @@ class Atoms:
         something else than false, and the condition for all others.
 
         It is constant where it is always or never so, also of an atom whose variable is not kept.
-        Where only truth matters, a literal that can never be true is false, even if it can be unknown.
+        Where only truth matters, a literal that can never be true is false, even if it can be unknown; and
+        one of a variable that is not kept has no number, since only effects that matter to nothing read it.
         """
         key = (predicate, value, scope)
         if key not in self._tables:
@@ -177,28 +179,39 @@ class Atoms:
         if scope is Scope.WORLD and predicate in self.reach.usage.open:
             known = ((row, self._open_leaf(predicate, number, value)) for row, number in numbers.items())
             return OpenLeaves(known, other, lambda row: self._asked(predicate, row, value, other))
-        leaves = (
-            (row, self._leaf(numbers.get(row), values, value, strict=scope is Scope.TRUTH))
-            for row, values in self._possible[predicate].items()
+        possible, strict = self._possible[predicate], scope is Scope.TRUTH
+        lost = set[Row]()
+        if not strict and self._kept is not None:
+            lost = {row for row in possible if row not in numbers and self._changes(predicate, row)}
+        every = (
+            (row, self._leaf(numbers.get(row), values, value, strict))
+            for row, values in possible.items()
+            if row not in lost
         )
-        return Leaves(((row, leaf) for row, leaf in leaves if leaf is not None), other)
+        if not lost:
+            return Leaves(every, other)
+
+        def make(row: Row) -> Condition:
+            """What is asked for and not kept does not last, but must not be taken for a constant."""
+            return self._leaf(self.number(predicate, row), possible[row], value) if row in lost else other
+
+        return OpenLeaves(every, other, make)
 
     def _leaf(
-        self, number: int | None, values: tuple[Truth, ...], value: Truth | None, *, strict: bool
-    ) -> Condition | None:
-        """None where the variable matters and is not kept."""
+        self, number: int | None, values: tuple[Truth, ...], value: Truth | None, strict: bool = False
+    ) -> Condition:
         if value is None:
             if Truth.UNKNOWN not in values:
                 return TRUE
             if len(values) == 1:
                 return FALSE
-            return None if number is None else Known(number)
+            return Known(_NO_NUMBER if number is None else number)
         if values == (value,):
             return TRUE
         # A literal that can never be true may still be unknown, which matters unless strict.
         if value not in values and (strict or value is Truth.UNKNOWN or Truth.UNKNOWN not in values):
             return FALSE
-        return None if number is None else self._is[value][number]
+        return Is(_NO_NUMBER, value) if number is None else self._is[value][number]
 
     def _open_leaf(self, predicate: str, number: int, value: Truth | None) -> Condition:
         if value is Truth.TRUE or value is Truth.FALSE:
@@ -218,17 +231,20 @@ class Atoms:
         """The variable that a condition reads for an atom; None for a constant. An atom that only others can
         change gets one here, but for arguments of other types than the predicate's."""
         found = self.numbers[predicate].get(row)
-        if found is not None or predicate not in self.reach.usage.open:
+        if found is not None:
             return found
         steady = self.steady[predicate]
-        if row not in steady and self._fits(predicate, row):
+        if row not in steady and (self._changes(predicate, row) or self._may_change(predicate, row)):
             steady[row] = len(self.keys)
             self.keys.append((predicate, row))
             for value, leaves in self._is.items():
                 leaves.append(Is(steady[row], value))
         return steady.get(row)
 
-    def _fits(self, predicate: str, row: Row) -> bool:
+    def _may_change(self, predicate: str, row: Row) -> bool:
+        """Whether others may change an atom."""
+        if predicate not in self.reach.usage.open:
+            return False
         if row in self._possible[predicate]:
             return True
         if predicate not in self._well_typed:

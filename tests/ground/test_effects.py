@@ -257,6 +257,17 @@ def test_the_guards_of_an_action_kept_early_matter_when_their_effect_turns_out_t
     assert [variable.name for variable in task.variables] == ["one()", "p()", "q()", "r()", "two()"]
 
 
+@pytest.mark.parametrize("when", ["(when (x) {})", "(forall (?s) (when (at ?s) {}))"])
+def test_a_cost_under_a_condition_that_nothing_else_reads_is_refused_and_not_dropped(when: str) -> None:
+    text = f"""(define (domain d) (:predicates (x) (at ?s) (g)) (:functions (total-cost)) (:constants a b)
+      (:action flip :effect (and (not (x)) (not (at a)) (increase (total-cost) 1)))
+      (:action go :effect (and (g) {when.format("(increase (total-cost) 5)")})))
+    (define (problem p) (:domain d) (:init (x) (at a)) (:goal (g)) (:metric minimize (total-cost)))"""
+    with pytest.raises(BbtcError) as caught:
+        task_of(text)
+    assert {d.code for d in caught.value.diagnostics} == {"BBT0409"}
+
+
 def test_quantifiers_side_by_side_may_use_one_name() -> None:
     task = task_of(
         """(define (domain d) (:predicates (p ?x) (q ?x) (done)) (:constants a b)
