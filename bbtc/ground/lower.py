@@ -22,6 +22,7 @@ from bbtc.ground.condition import (
     Or,
     conjunction,
     disjunction,
+    doubt,
     negation,
 )
 from bbtc.ground.normal import conjuncts, disjuncts, free, normal_form
@@ -516,28 +517,12 @@ class _Derived:
 
     def _test(self, predicate: str, row: Row, value: Truth | None) -> Condition:
         """``(unknown p)`` or ``(known p)`` of a derived atom."""
-        unknown = self._unknown(self._unfold(predicate, row))
+        unknown = doubt(self._unfold(predicate, row), self._unknown)
         return negation(unknown) if value is None else unknown
 
-    def _unknown(self, condition: Condition) -> Condition:
-        """When a Kleene condition is unknown: it may be true (no part settles it), yet is not."""
-        match condition:
-            case Is(variable, value) if value is not Truth.UNKNOWN:
-                predicate, row = self._lowering.atoms.keys[variable]
-                return self._lowering.atoms.leaves(predicate, Truth.UNKNOWN, self._scope)[row]
-            case And(parts):
-                some = disjunction(map(self._unknown, parts))
-                return conjunction([some, *map(self._not_false, parts)])
-            case Or(parts):
-                some = disjunction(map(self._unknown, parts))
-                return conjunction([some, *(self._not_false(negation(part)) for part in parts)])
-            case _:
-                # Constants and tests are never unknown.
-                return FALSE
-
-    def _not_false(self, condition: Condition) -> Condition:
-        """True where the condition is true or unknown, else false or unknown."""
-        return disjunction([condition, self._unknown(condition)])
+    def _unknown(self, variable: int) -> Condition:
+        predicate, row = self._lowering.atoms.keys[variable]
+        return self._lowering.atoms.leaves(predicate, Truth.UNKNOWN, self._scope)[row]
 
 
 def _absorbed(condition: Condition) -> Condition:
