@@ -9,12 +9,12 @@ import pytest
 from click.testing import CliRunner
 
 import bbtc
-from bbtc.cli.main import cli
+from bbtc.cli.commands import cli
 from bbtc.diagnostics import Severity
 from bbtc.source import SourceFile
 
-# A courier crosses once; what that costs and earns besides the 2 of the way is `{}`. All that it may depend on can
-# change, but too late.
+# A courier crosses once; what that costs and earns besides the 2 of the way is `{}`. All that it may depend
+# on can change, but too late.
 COURIER = """(define (domain courier)
   (:requirements :typing :mdp :rewards :action-costs :conditional-effects :probabilistic-effects
     :non-deterministic :negative-preconditions :universal-effects :unknown)
