@@ -15,7 +15,7 @@ import argparse
 import math
 import random
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -37,7 +37,7 @@ class Robot(Protocol):
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
-    def is_in(self, room: str) -> bool:
+    def is_in(self, room: str) -> bool | None:
         """Whether in(room) holds."""
 
     def locked(self, door: str) -> bool | None:
@@ -48,6 +48,14 @@ class Robot(Protocol):
 
     def go_through(self, door: str, arg_from: str, to: str) -> Status:
         """Start or continue go_through(door, arg_from, to)."""
+
+
+Fact = tuple[str, ...]
+
+
+def in_words(fact: Fact) -> str:
+    """``predicate(object,…)``."""
+    return f"{fact[0]}({','.join(fact[1:])})"
 
 
 class Condition(Behaviour):
@@ -109,7 +117,7 @@ class Latch(Decorator):
             self.stop(self._final)
             yield self
             return
-        ready = True if self._started or self._guard is None else self._guard()
+        ready = True if self._started else self._ready()
         if ready:
             self._announce()
             self._started = True
@@ -128,6 +136,13 @@ class Latch(Decorator):
     def terminate(self, new_status: Status) -> None:
         if new_status == Status.INVALID and self._started:
             self._end(Status.SUCCESS)
+
+    def _ready(self) -> bool | None:
+        """Whether the action may start now."""
+        ready = True if self._guard is None else self._guard()
+        why = "unknown" if ready is None else "false"
+        self.feedback_message = "" if ready else f"its precondition is {why}"
+        return ready
 
     def _announce(self) -> None:
         above = self.parent
@@ -158,21 +173,10 @@ class Retry(Decorator):
 class Try(Latch):
     """An action below a Retry: it starts only if every Retry above it has an attempt left."""
 
-    def __init__(
-        self,
-        name: str,
-        act: Callable[[], Status],
-        cancel: Callable[[str], None],
-        guard: Callable[[], bool | None] | None = None,
-        keep: bool = True,
-    ) -> None:
-        super().__init__(name, act, cancel, self._attempt, keep)
-        self._allowed = guard
-
-    def _attempt(self) -> bool | None:
-        allowed = True if self._allowed is None else self._allowed()
-        if not allowed:
-            return allowed
+    def _ready(self) -> bool | None:
+        ready = super()._ready()
+        if not ready:
+            return ready
         retries: list[Retry] = []
         above = self.parent
         while above is not None:
@@ -209,13 +213,30 @@ class WithSetup(Protocol):
         """Called once, with what the owner of the tree hands on: in py_trees_ros, ``node``."""
 
 
+@runtime_checkable
+class WithBeliefs(Protocol):
+    """A robot that can tell what it has not heard of yet."""
+
+    def heard_of(self, *fact: str, unknown: bool) -> bool:
+        """Whether a fact is known to be true or false, or, where ``unknown`` will do, unknown."""
+
+
 class StopWhenBlocked(Decorator):
     """The root: FAILURE where the tree is RUNNING but no action is. Something is unknown then that
-    nothing can observe, and nothing would ever change."""
+    nothing can observe, and nothing would ever change. Before its first tick the tree waits,
+    however long, until the robot has heard of every fact in ``reads``, which tells for each whether
+    it can be unknown."""
 
-    def __init__(self, robot: object, child: Behaviour) -> None:
+    def __init__(
+        self,
+        robot: object,
+        child: Behaviour,
+        reads: Mapping[Fact, bool] | None = None,
+    ) -> None:
         super().__init__(name="stop when blocked", child=child)
         self._robot = robot
+        self._reads = dict(reads or {})
+        self._said: float | None = None
         self._acting = False
         self._last: Latch | None = None
 
@@ -239,14 +260,39 @@ class StopWhenBlocked(Decorator):
         self._acting = True
 
     def tick(self) -> Iterator[Behaviour]:
+        if self._reads and self._waits():
+            self.status = Status.RUNNING
+            yield self
+            return
+        self._reads.clear()
         self._acting = False
         yield from super().tick()
 
+    def _waits(self) -> bool:
+        if not isinstance(self._robot, WithBeliefs):
+            return False
+        heard, facts = self._robot.heard_of, self._reads.items()
+        missing = [in_words(fact) for fact, unknown in facts if not heard(*fact, unknown=unknown)]
+        self.feedback_message = f"waiting to hear of {', '.join(missing)}" if missing else ""
+        now = time.monotonic()
+        if missing and (self._said is None or now - self._said >= 10.0):
+            self._said = now
+            self.logger.warning(self.feedback_message)
+        return bool(missing)
+
     def update(self) -> Status:
         if self.decorated.status == Status.RUNNING and not self._acting:
-            self.feedback_message = "blocked: nothing can observe what is unknown"
+            self.feedback_message = "blocked: nothing can observe what is unknown" + self._refused()
             return Status.FAILURE
+        if self.decorated.status == Status.FAILURE and self._last is None:
+            self.feedback_message = "no action was started" + self._refused()
         return self.decorated.status
+
+    def _refused(self) -> str:
+        """The actions that were not started, and why."""
+        latches = [node for node in self.decorated.iterate() if isinstance(node, Latch)]
+        refused = [node for node in latches if node.feedback_message]
+        return "".join(f"; {node.name}: {node.feedback_message}" for node in refused)
 
 
 def run(root: Behaviour, period: float = 0.0) -> Status:
@@ -293,10 +339,10 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
         ),
+        READS,
     )
 
 
-Fact = tuple[str, ...]
 State = dict[Fact, bool | None]
 T = TypeVar("T")
 
@@ -384,11 +430,6 @@ class World:
         return Status.SUCCESS
 
 
-def in_words(fact: Fact) -> str:
-    """``predicate(object,…)``."""
-    return f"{fact[0]}({','.join(fact[1:])})"
-
-
 def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) -> None:
     """Run trees in the simulated world as the command line says; ``make`` makes one."""
     parser = argparse.ArgumentParser(description="Run the tree in a simulated world.")
@@ -402,6 +443,10 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
     else:
         ends = [run(make(rng, lambda _: None)) for _ in range(options.runs)]
         print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
+
+
+READS: dict[Fact, bool] = {("in", "lab"): False, ("locked", "lab_door"): True}
+"""The facts that the tree reads, and whether they can be unknown."""
 
 
 INITIAL: list[tuple[str, State]] = [
@@ -435,8 +480,8 @@ ACTIONS: dict[Fact, list[Factor]] = {
 class SimulatedWorld(World):
     """Plays the robot."""
 
-    def is_in(self, room: str) -> bool:
-        return self._value("in", room) is True
+    def is_in(self, room: str) -> bool | None:
+        return self._value("in", room)
 
     def locked(self, door: str) -> bool | None:
         return self._value("locked", door)
