@@ -60,6 +60,7 @@ CODES: dict[str, str] = {
     "BBT0226": "section given twice",
     "BBT0227": "predicate with the name of a test",
     "BBT0228": "name with a meaning of its own",
+    "BBT0229": "derived predicate is external",
     "BBT0230": "name that only a lenient reading takes",
     # 03xx: checks
     "BBT0301": "unused predicate",
@@ -73,6 +74,7 @@ CODES: dict[str, str] = {
     "BBT0309": "unused parameter",
     "BBT0310": "unused template",
     "BBT0311": "requirements that do not match the content",
+    "BBT0313": "condition that only others can make true",
     "BBT0315": "fact that nothing makes unknown",
     "BBT0316": "goal that nothing can make true",
     # 04xx: grounding

@@ -116,7 +116,8 @@ def _unread_predicates(model: md.Model) -> Iterator[Diagnostic]:
 def _never_unknown(model: md.Model) -> Iterator[Diagnostic]:
     reached = facts.reached(model)
     for name, predicate in model.predicates.items():
-        if predicate.declared_three_valued and (name, Truth.UNKNOWN) not in reached.values:
+        others = predicate.external  # who may make it unknown
+        if predicate.declared_three_valued and not others and (name, Truth.UNKNOWN) not in reached.values:
             yield _warning(
                 "BBT0218",
                 f"`{name}` is declared three-valued, but nothing makes it unknown",
@@ -159,7 +160,7 @@ def _never_known(model: md.Model, lost: set[str]) -> Iterator[Diagnostic]:
             predicate = model.predicates[reading.atom.predicate]
             if reading.value is Truth.UNKNOWN or predicate.name not in lost or predicate.name in told:
                 continue
-            if not predicate.derived:
+            if not predicate.derived and not predicate.external:
                 told.add(predicate.name)
                 yield _warning(
                     "BBT0304",
@@ -175,6 +176,15 @@ def _lost_knowledge(model: md.Model) -> Iterator[Diagnostic]:
 
 
 def _hopeless_conditions(model: md.Model) -> Iterator[Diagnostic]:
+    """Readings of values that nothing gives; those of external predicates have a note of their own."""
+    return (found for found in _never_so(model) if found.code == "BBT0304")
+
+
+def _only_others(model: md.Model) -> Iterator[Diagnostic]:
+    return (found for found in _never_so(model) if found.code == "BBT0313")
+
+
+def _never_so(model: md.Model) -> Iterator[Diagnostic]:
     reached = facts.reached(model)
     lost = _set_to(model, unknown=True)
     initially = {name for name, value in reached.values if value is Truth.UNKNOWN} - lost
@@ -193,6 +203,11 @@ def _hopeless_conditions(model: md.Model) -> Iterator[Diagnostic]:
                 and (value is Truth.UNKNOWN or related[0].message not in never_known)
             ):
                 told.add((name, value))
+                if model.predicates[name].external:
+                    message = f"only others can make `{name}` {value.word}"
+                    hint = "plans and figures take it to stay as `:init` says"
+                    yield Diagnostic("BBT0313", message, reading.span, hint, Severity.NOTE, related)
+                    continue
                 message = f"nothing makes `{name}` {value.word}"
                 hint = "`:init` does not give it, and no action that can apply sets it"
                 yield _warning("BBT0304", message, reading.span, hint, related)
@@ -206,6 +221,8 @@ def _unreachable_actions(model: md.Model) -> Iterator[Diagnostic]:
     for name, schema in model.schemas.items():
         if name not in reached.actions:
             first = _impossible(schema.precondition, reached)
+            if first is not None and any(model.predicates[a.predicate].external for a in mf.atoms(first)):
+                continue  # of which BBT0313 tells
             related = () if first is None else (Related("this is never true", first.span),)
             yield _warning("BBT0302", f"action `{name}` can never apply", schema.span, None, related)
 
@@ -397,6 +414,7 @@ CHECKS = (
     Check("BBT0303", _contradictions),
     Check("BBT0304", _lost_knowledge),
     Check("BBT0304", _hopeless_conditions, needs_problem=True),
+    Check("BBT0313", _only_others, needs_problem=True),
     Check("BBT0305", _duplicates),
     Check("BBT0306", _without_effect),
     Check("BBT0307", _irrelevant_actions, needs_problem=True),

@@ -199,8 +199,16 @@ def _predicates(names: Names, domain: ast.Definition) -> None:
                 names.parameters(node.parameters),
                 declared_three_valued=node.three_valued,
                 derived=key in names.derived,
+                external=node.external,
                 span=node.name.span,
             )
+            if predicate.external and predicate.derived:
+                names.report.error(
+                    "BBT0229",
+                    f"the derived predicate `{node.name.text}` cannot be external",
+                    node.span,
+                    "its rules say when it holds: declare what they read as external",
+                )
             before = names.predicates.setdefault(key, predicate)
             if before is not predicate:
                 same = [p.types for p in before.parameters] == [p.types for p in predicate.parameters]

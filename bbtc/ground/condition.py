@@ -107,6 +107,31 @@ def negation(part: Condition) -> Condition:
             assert_never(part)
 
 
+def doubt(condition: Condition, leaf: Callable[[int], Condition]) -> Condition:
+    """When a Kleene condition in negation normal form is unknown: it may be true (no part settles it), yet
+    is not. ``leaf`` tells when a variable is unknown."""
+
+    def not_false(part: Condition) -> Condition:
+        """True where the part is true or unknown, else false or unknown."""
+        return disjunction([part, doubt(part, leaf)])
+
+    match condition:
+        case Is(variable, value) if value is not Truth.UNKNOWN:
+            return leaf(variable)
+        case And(parts):
+            some = disjunction(doubt(part, leaf) for part in parts)
+            return conjunction([some, *map(not_false, parts)])
+        case Or(parts):
+            some = disjunction(doubt(part, leaf) for part in parts)
+            return conjunction([some, *(not_false(negation(part)) for part in parts)])
+        case Not(part):
+            return doubt(negation(part), leaf)
+        case Is() | Known() | Constant():  # never unknown
+            return FALSE
+        case _:
+            assert_never(condition)
+
+
 def conjuncts(condition: Condition) -> tuple[Condition, ...]:
     """The parts of a conjunction; a condition of another kind is its only part; true has none."""
     if isinstance(condition, And):

@@ -10,7 +10,7 @@ from itertools import repeat
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
-from bbtc.ground.atoms import Atoms
+from bbtc.ground.atoms import Atoms, Scope
 from bbtc.ground.bulk import Shared
 from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
@@ -92,7 +92,7 @@ class _Loop:
 
     @staticmethod
     def _lower(lowering: Lowering, frame: Frame, parts: list[mf.Formula]) -> list[Lowered]:
-        return [lowering.normal(part, frame, strict=True) for part in parts]
+        return [lowering.normal(part, frame, Scope.TRUTH) for part in parts]
 
     def guards(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
         """For each binding, which is then in ``env``: the guard's conditions (no constants),

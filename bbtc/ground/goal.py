@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from typing_extensions import assert_never
 
@@ -83,7 +83,7 @@ def _never(
     first, *others = [part for part, _ in parts]
     return Diagnostic(
         "BBT0316",
-        f"nothing can make the goal {_shown(first, model)} true",
+        f"{_nothing(model, [each.what for each in missing])} can make the goal {_shown(first, model)} true",
         first.span or model.goal_span,
         _hint(reached, missing),
         Severity.WARNING,
@@ -95,6 +95,12 @@ def _is_unknown(what: Lack) -> bool:
     return isinstance(what, Fact) and what.value is Truth.UNKNOWN
 
 
+def _nothing(model: md.Model, facts: Iterable[Lack]) -> str:
+    """What cannot bring facts about: others may change those of external predicates."""
+    external = any(isinstance(fact, Fact) and model.predicates[fact.predicate].external for fact in facts)
+    return "no action" if external else "nothing"
+
+
 def _forgotten(model: md.Model, universe: Universe, missing: Sequence[Missing]) -> Diagnostic:
     """The warning about facts that nothing makes unknown, although something must find out about them."""
     facts = [each.what for each in missing if isinstance(each.what, Fact)]
@@ -104,7 +110,7 @@ def _forgotten(model: md.Model, universe: Universe, missing: Sequence[Missing]) 
     texts = _all_written(model, universe, told)
     return Diagnostic(
         "BBT0315",
-        f"nothing makes {names}{more} unknown",
+        f"{_nothing(model, facts)} makes {names}{more} unknown",
         model.init.span or model.problem_span,
         f"add `{texts}` to `:init`: what it does not mention is false",
         Severity.WARNING,
@@ -161,7 +167,7 @@ def _fact_told(reached: Reach, missing: Missing, fact: Fact) -> str:
     name, value, by = _name(model, universe, fact), fact.value, missing.by
     if value is Truth.UNKNOWN:
         start = "the goal" if by is None else f"`{by}`"
-        return f"{start} needs `{name}` to be unknown, and nothing makes it so"
+        return f"{start} needs `{name}` to be unknown, and {_nothing(model, [fact])} makes it so"
     if missing.setters:
         listed = ", ".join(f"`{each}`" for each in missing.setters[:_MOST_NAMED])
         return f"only {listed} could make `{name}` {value.word}, and never can: is it missing in `:init`?"
@@ -171,6 +177,13 @@ def _fact_told(reached: Reach, missing: Missing, fact: Fact) -> str:
     nothing = (
         f"no action makes `{name}` {value.word}" if by is None else f"{needs}, and no action makes it so"
     )
+    if model.predicates[fact.predicate].external:
+        only = (
+            f"only others can make `{name}` {value.word}"
+            if by is None
+            else f"{needs}, and only others can make it so"
+        )
+        return f"{only}: no plan counts on that"
     if None not in fact.row and reached.can_be(Truth.UNKNOWN, fact.predicate, _numbers(fact)):
         return f"{nothing} once it is unknown"
     if value is Truth.FALSE:

@@ -19,7 +19,7 @@ from bbtc.ground.effects import EffectLowering, LoweredEffect
 from bbtc.ground.goal import unreachable
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normalise
-from bbtc.ground.prune import prune
+from bbtc.ground.prune import prune, reordered
 from bbtc.ground.reach import Reach, reach
 from bbtc.ground.refused import refused
 from bbtc.ground.relevance import Relevance
@@ -128,16 +128,17 @@ class _TaskBuilder:
         """The task with the actions of the given rows (which are used up), in the order of the
         model's schemas."""
         model, report, limits = self.model, self.report, self.limits
-        variables = self.atoms.variables()
         goal = _goal(model, self.atoms, report, limits)
-        initial = self._initial(variables)
         actions = self._actions(rows)
         templates = self._all_templates()
+        # The last of them, since conditions ask for variables.
+        variables = self.atoms.variables()
+        initial = self._initial(variables)
         report.raise_errors()
         if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
             report.warning("BBT0413", "the goal already holds at the start", model.goal_span)
         limits.check_time("grounding")
-        return gt.Task(
+        task = gt.Task(
             domain=model.domain,
             problem=model.problem or "",
             variables=variables,
@@ -151,6 +152,8 @@ class _TaskBuilder:
             signatures=_signatures(model),
             goal_span=model.goal_span,
         )
+        order = self.atoms.order()
+        return task if order == list(range(len(variables))) else reordered(task, order)
 
     # --- actions -----------------------------------------------------------------------------
 
@@ -246,7 +249,7 @@ class _TemplateMaker:
         if self._compiled is None:
             lowering, template = self.builder.lowering, self.template
             self._compiled = (
-                lowering.condition(template.precondition, self.frame, strict=True),
+                lowering.condition(template.precondition, self.frame),
                 None
                 if template.effect is None
                 else self.builder.effects.effect(normalise(template.effect), self.frame, template.span),

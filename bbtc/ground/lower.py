@@ -10,7 +10,7 @@ from typing import Any
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import BbtcError
-from bbtc.ground.atoms import Atoms, Leaves
+from bbtc.ground.atoms import Atoms, Leaves, OpenLeaves, Scope
 from bbtc.ground.bulk import Shared, instances, picker
 from bbtc.ground.condition import (
     FALSE,
@@ -22,6 +22,7 @@ from bbtc.ground.condition import (
     Or,
     conjunction,
     disjunction,
+    doubt,
     negation,
 )
 from bbtc.ground.normal import conjuncts, disjuncts, free, normal_form
@@ -106,27 +107,34 @@ class Lowering:
         self.universe = atoms.universe
         self._limits = limits
         self._bindings = self._unlooked = 0
-        self._derived = _Derived(self)
+        model = _Derived(self, Scope.MODEL)
+        self._derived = {Scope.WORLD: _Derived(self, Scope.WORLD), Scope.MODEL: model, Scope.TRUTH: model}
 
-    def condition(self, formula: mf.Formula, frame: Frame, *, strict: bool = False) -> Lowered:
-        """``strict``: only whether the condition is true matters, not whether false or unknown."""
-        return self.normal(normal_form(formula), frame, strict=strict)
+    def condition(self, formula: mf.Formula, frame: Frame, scope: Scope = Scope.WORLD) -> Lowered:
+        """The condition, which means what the text says wherever ``scope`` asks for it."""
+        return self.normal(normal_form(formula), frame, scope)
 
     def reached(self, formula: mf.Formula, parameters: tuple[Parameter, ...]) -> Shared[Condition]:
-        """:meth:`condition` (strict) for many argument rows, of which reachability has found that the
-        formula can be true of them: there, parts that never change are true."""
+        """:meth:`condition` for many argument rows, of which reachability has found that the formula can
+        be true of them: there, parts that never change are true. It is false where a closer look finds that
+        it can never be true in the model."""
         parts = sorted(conjuncts(normal_form(formula)), key=self._late)
-        parts = [part for part in parts if not self._settled(part)]
+        parts = [part for part in parts if not self._settled(part, Scope.WORLD)]
         names = (name for part in parts for name in free(part))
         used, frame = projection(self.universe, parameters, names)
         read = tuple(parameters[slot] for slot in used)
         return Shared(used, len(parameters), _Conjunction(self, parts, read, frame).all)
 
     def lowered(self, part: mf.Formula, parameters: tuple[Parameter, ...]) -> Shared[Condition]:
-        """:meth:`normal` (strict) for many argument rows."""
+        """:meth:`normal` for many argument rows; false where it can never be true in the model."""
         used, frame = projection(self.universe, parameters, free(part))
-        condition = self.normal(part, frame, strict=True)
-        return Shared(used, len(parameters), lambda rows: [condition(frame.env(row)) for row in rows])
+        condition, can_be_true = self.normal(part, frame, Scope.WORLD), self.atoms.can_be_true
+
+        def make(rows: list[Row]) -> list[Condition]:
+            found = [condition(frame.env(row)) for row in rows]
+            return [each if can_be_true(each) else FALSE for each in found]
+
+        return Shared(used, len(parameters), make)
 
     def spend(self, count: int) -> None:
         """Count objects that a quantifier is tried with. Raises at the limits."""
@@ -141,38 +149,38 @@ class Lowering:
         self._unlooked = 0
         self._limits.check_time("grounding")
 
-    def ground(self, formula: mf.Formula, *, strict: bool = False) -> Condition:
+    def ground(self, formula: mf.Formula, scope: Scope = Scope.WORLD) -> Condition:
         """A condition without free parameters."""
         frame = Frame(self.universe, ())
-        return self.condition(formula, frame, strict=strict)(frame.env(()))
+        return self.condition(formula, frame, scope)(frame.env(()))
 
     def is_never(self, formula: mf.Formula) -> bool:
         """Whether a condition without free parameters is true in no state, even if nothing is ever undone."""
-        return self.ground(formula, strict=True) is FALSE
+        return self.ground(formula, Scope.TRUTH) is FALSE
 
-    def normal(self, formula: mf.Formula, frame: Frame, *, strict: bool) -> Lowered:
+    def normal(self, formula: mf.Formula, frame: Frame, scope: Scope) -> Lowered:
         """:meth:`condition` of a formula in normal form."""
         match formula:
             case mf.Atom(predicate, args):
-                return self._literal(predicate, args, Truth.TRUE, frame, strict)
+                return self._literal(predicate, args, Truth.TRUE, frame, scope)
             case mf.Not(mf.Atom(predicate, args)):
-                return self._literal(predicate, args, Truth.FALSE, frame, strict)
+                return self._literal(predicate, args, Truth.FALSE, frame, scope)
             case mf.Test(kind, atom):
                 value = Truth.UNKNOWN if kind == "unknown" else None
-                return self._literal(atom.predicate, atom.args, value, frame, strict)
+                return self._literal(atom.predicate, atom.args, value, frame, scope)
             case mf.Equal(left, right):
                 return _equal(frame.slot(left), frame.slot(right), TRUE, FALSE)
             case mf.Not(mf.Equal(left, right)):
                 return _equal(frame.slot(left), frame.slot(right), FALSE, TRUE)
             case mf.And():
                 parts = sorted(conjuncts(formula), key=self._late)
-                return _all([self.normal(part, frame, strict=strict) for part in parts])
+                return _all([self.normal(part, frame, scope) for part in parts])
             case mf.Or():
                 parts = sorted(disjuncts(formula), key=self._late)
-                return _any([self.normal(part, frame, strict=strict) for part in parts])
+                return _any([self.normal(part, frame, scope) for part in parts])
             case mf.Quantified(kind, (parameter,), inner):
                 slot, members = frame.slot(parameter.name), self.universe.members(parameter.types)
-                lowered = self.normal(inner, frame, strict=strict)
+                lowered = self.normal(inner, frame, scope)
                 if kind == "forall":
                     return _for_all(slot, members, lowered, self.spend)
                 return _for_some(slot, members, lowered, self.spend)
@@ -182,7 +190,7 @@ class Lowering:
                 assert_never(formula)
 
     def number(self, predicate: str, args: tuple[mf.Term, ...], frame: Frame) -> Callable[[Env], int | None]:
-        """The variable of an atom; None for an atom that never changes."""
+        """The variable that setting an atom sets; None for an atom that the model never changes."""
         rows, get = frame.rows(args), self.atoms.numbers[predicate].get
         return lambda env: get(rows(env))
 
@@ -193,6 +201,24 @@ class Lowering:
         get, read = self.atoms.numbers[predicate].get, frame.columns(args)
         return lambda rows: list(map(get, read(rows)))
 
+    def read(
+        self, predicate: str, args: tuple[mf.Term, ...], frame: Frame
+    ) -> Callable[[list[Row]], list[int | None]]:
+        """The variable that a condition reads for an atom, of many argument rows; None for a constant."""
+        atoms, rows_of = self.atoms, frame.columns(args)
+        get = atoms.numbers[predicate].get
+        if predicate not in atoms.reach.usage.open:
+            return lambda rows: list(map(get, rows_of(rows)))
+
+        def read(rows: list[Row]) -> list[int | None]:
+            found = list(rows_of(rows))
+            numbers = list(map(get, found))
+            if None in numbers:
+                return [atoms.number(predicate, row) for row in found]
+            return numbers
+
+        return read
+
     def members(
         self, parameter: Parameter, parts: list[mf.Formula], frame: Frame
     ) -> Callable[[Env], Sequence[int]]:
@@ -200,7 +226,7 @@ class Lowering:
         changes is taken out if there is one: then only those objects are given that it is true of."""
         every = self.universe.members(parameter.types)
         for part in parts:
-            if isinstance(part, mf.Atom) and parameter.name in part.args and self._settled(part):
+            if isinstance(part, mf.Atom) and parameter.name in part.args and self._settled(part, Scope.TRUTH):
                 if part.predicate in self.atoms.reach.usage.derived:
                     continue
                 parts.remove(part)
@@ -214,8 +240,7 @@ class Lowering:
         others = [place for place, arg in enumerate(part.args) if arg != parameter.name]
         found: dict[Row, list[int]] = {}
         order = {number: position for position, number in enumerate(every)}
-        leaves, _ = self.atoms.leaves(part.predicate, Truth.TRUE, strict=True)
-        for row, leaf in leaves.items():
+        for row, leaf in self.atoms.leaves(part.predicate, Truth.TRUE, Scope.TRUTH).items():
             number = row[here[0]]
             if leaf is TRUE and number in order and all(row[place] == number for place in here):
                 found.setdefault(tuple([row[place] for place in others]), []).append(number)
@@ -231,32 +256,38 @@ class Lowering:
             case mf.Equal() | mf.Not(mf.Equal()):
                 return 0
             case mf.Atom(predicate) | mf.Not(mf.Atom(predicate)):
-                return 1 if self.atoms.reach.usage.is_static(predicate) else 2
+                usage = self.atoms.reach.usage
+                return 1 if usage.is_static(predicate) and predicate not in usage.open else 2
             case _:
                 return 2
 
-    def _settled(self, part: mf.Formula) -> bool:
-        """Whether the part is the same at all times."""
+    def _settled(self, part: mf.Formula, scope: Scope) -> bool:
+        """Whether the part is the same in all states of the scope."""
         match part:
             case mf.Equal() | mf.Not(mf.Equal()):
                 return True
             case mf.Atom(predicate) | mf.Not(mf.Atom(predicate)):
-                if predicate in self.atoms.reach.usage.derived:
-                    return predicate in self.atoms.reach.usage.unchanging
+                usage = self.atoms.reach.usage
+                if predicate in usage.derived:
+                    return predicate in (usage.fixed if scope is Scope.WORLD else usage.unchanging)
                 value = Truth.TRUE if isinstance(part, mf.Atom) else Truth.FALSE
-                leaves, _ = self.atoms.leaves(predicate, value, strict=True)
-                return all(isinstance(leaf, Constant) for leaf in leaves.values())
+                leaves = self.atoms.leaves(predicate, value, scope)
+                return not isinstance(leaves, OpenLeaves) and all(
+                    isinstance(leaf, Constant) for leaf in leaves.values()
+                )
             case _:
                 return False
 
     def _literal(
-        self, predicate: str, args: tuple[mf.Term, ...], value: Truth | None, frame: Frame, strict: bool
+        self, predicate: str, args: tuple[mf.Term, ...], value: Truth | None, frame: Frame, scope: Scope
     ) -> Lowered:
         rows = frame.rows(args)
         if predicate in self.atoms.reach.usage.derived:
-            return self._derived.literal(predicate, rows, value)
-        leaves, other = self.atoms.leaves(predicate, value, strict=strict)
-        get = leaves.get
+            return self._derived[scope].literal(predicate, rows, value)
+        leaves = self.atoms.leaves(predicate, value, scope)
+        if isinstance(leaves, OpenLeaves):
+            return lambda env: leaves[rows(env)]
+        get, other = leaves.get, leaves.other
         return lambda env: get(rows(env), other)
 
 
@@ -329,8 +360,8 @@ class _Conjunction:
                     predicate not in lowering.atoms.reach.usage.derived
                 ):
                     value = Truth.TRUE if isinstance(part, mf.Atom) else Truth.FALSE
-                    leaves, other = lowering.atoms.leaves(predicate, value, strict=True)
-                    self._columns.append(_leaf_column(leaves, other, frame.columns(args)))
+                    leaves = lowering.atoms.leaves(predicate, value, Scope.WORLD)
+                    self._columns.append(_leaf_column(leaves, frame.columns(args)))
                     plain = all(type(leaf) is Is for leaf in leaves.values())
                     self._kinds.append((predicate, value) if plain else None)
                 case _:
@@ -369,10 +400,10 @@ def _repeats(columns: list[list[Condition]]) -> bool:
 
 
 def _leaf_column(
-    leaves: Leaves, other: Condition, read: Callable[[list[Row]], Iterable[Row]]
+    leaves: Leaves, read: Callable[[list[Row]], Iterable[Row]]
 ) -> Callable[[list[Row]], list[Condition]]:
-    get = leaves.get
-    return lambda rows: list(map(get, read(rows), repeat(other)))
+    get = leaves.__getitem__
+    return lambda rows: list(map(get, read(rows)))
 
 
 def conjoin(parts: list[Condition]) -> Condition:
@@ -403,8 +434,9 @@ class _Derived:
     atom to prove itself is never needed. Results are kept where no such cut was made.
     """
 
-    def __init__(self, lowering: Lowering) -> None:
+    def __init__(self, lowering: Lowering, scope: Scope) -> None:
         self._lowering = lowering
+        self._scope = scope
         self._reach = lowering.atoms.reach
         self._rules: dict[str, list[tuple[md.Rule, Frame, list[int], Lowered]]] = {}
         self._known: dict[tuple[str, Row], Condition] = {}
@@ -423,11 +455,13 @@ class _Derived:
 
     def _unfold(self, predicate: str, row: Row) -> Condition:
         key = (predicate, row)
-        if row not in self._reach.values[Truth.TRUE][predicate]:
-            if row not in self._reach.values[Truth.UNKNOWN][predicate]:
-                return FALSE
-        elif predicate in self._reach.usage.unchanging:
-            return TRUE
+        usage = self._reach.usage
+        if self._scope is not Scope.WORLD or predicate in usage.fixed:
+            if row not in self._reach.values[Truth.TRUE][predicate]:
+                if row not in self._reach.values[Truth.UNKNOWN][predicate]:
+                    return FALSE
+            elif predicate in usage.unchanging:
+                return TRUE
         if key in self._known:
             return self._known[key]
         if key in self._depth:
@@ -494,33 +528,16 @@ class _Derived:
             if rule.predicate == predicate:
                 frame = Frame(self._lowering.universe, rule.parameters)
                 head = [frame.slot(arg) for arg in rule.args]
-                yield rule, frame, head, self._lowering.condition(rule.condition, frame)
+                yield rule, frame, head, self._lowering.condition(rule.condition, frame, self._scope)
 
     def _test(self, predicate: str, row: Row, value: Truth | None) -> Condition:
         """``(unknown p)`` or ``(known p)`` of a derived atom."""
-        unknown = self._unknown(self._unfold(predicate, row))
+        unknown = doubt(self._unfold(predicate, row), self._unknown)
         return negation(unknown) if value is None else unknown
 
-    def _unknown(self, condition: Condition) -> Condition:
-        """When a Kleene condition is unknown: it may be true (no part settles it), yet is not."""
-        match condition:
-            case Is(variable, value) if value is not Truth.UNKNOWN:
-                predicate, row = self._lowering.atoms.key(variable)
-                leaves, other = self._lowering.atoms.leaves(predicate, Truth.UNKNOWN, strict=True)
-                return leaves.get(row, other)
-            case And(parts):
-                some = disjunction(map(self._unknown, parts))
-                return conjunction([some, *map(self._not_false, parts)])
-            case Or(parts):
-                some = disjunction(map(self._unknown, parts))
-                return conjunction([some, *(self._not_false(negation(part)) for part in parts)])
-            case _:
-                # Constants and tests are never unknown.
-                return FALSE
-
-    def _not_false(self, condition: Condition) -> Condition:
-        """True where the condition is true or unknown, else false or unknown."""
-        return disjunction([condition, self._unknown(condition)])
+    def _unknown(self, variable: int) -> Condition:
+        predicate, row = self._lowering.atoms.keys[variable]
+        return self._lowering.atoms.leaves(predicate, Truth.UNKNOWN, self._scope)[row]
 
 
 def _absorbed(condition: Condition) -> Condition:

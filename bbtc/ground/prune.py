@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from typing_extensions import assert_never
@@ -25,14 +25,18 @@ def prune(task: gt.Task) -> gt.Task:
     relevance = _Relevance(task)
     relevance.close()
     kept = relevance.variables
-    renumber = {old: new for new, old in enumerate(sorted(kept))}
-    mapper = _Mapper(renumber)
     actions = [task.actions[index] for index in sorted(relevance.actions)]
     templates = [task.templates[index] for index in sorted(relevance.templates)]
-    if len(kept) == len(task.variables):
-        if len(actions) == len(task.actions) and len(templates) == len(task.templates):
-            return task
-        return replace(task, actions=tuple(actions), templates=tuple(templates))
+    if len(actions) < len(task.actions) or len(templates) < len(task.templates):
+        task = replace(task, actions=tuple(actions), templates=tuple(templates))
+    return task if len(kept) == len(task.variables) else reordered(task, sorted(kept))
+
+
+def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
+    """The task with the given variables, by their old numbers in their new order, without effects on others.
+    Those that effects set keep their order."""
+    renumber = {old: new for new, old in enumerate(order)}
+    mapper = _Mapper(renumber)
     initial: dict[tuple[object, ...], gt.InitialState] = {}
     for state in task.initial:
         values = tuple(state.values[old] for old in renumber)
@@ -44,8 +48,8 @@ def prune(task: gt.Task) -> gt.Task:
         variables=tuple(task.variables[old] for old in renumber),
         initial=tuple(initial.values()),
         goal=mapper.condition(task.goal),
-        actions=tuple(mapper.action(action) for action in actions),
-        templates=tuple(mapper.template(template) for template in templates),
+        actions=tuple(map(mapper.action, task.actions)),
+        templates=tuple(map(mapper.template, task.templates)),
     )
 
 

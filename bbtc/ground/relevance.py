@@ -100,8 +100,7 @@ def _literals(lowering: Lowering, formula: mf.Formula, frame: Frame) -> list[Num
             case mf.Atom(predicate, args) | mf.Not(mf.Atom(predicate, args)):
                 if predicate in lowering.atoms.reach.usage.derived:
                     return None
-                if lowering.atoms.numbers[predicate]:
-                    found.append(lowering.numbers(predicate, args, frame))
+                found.append(lowering.read(predicate, args, frame))
             case _:
                 return None
     return found

@@ -45,7 +45,10 @@ class Usage:
                     self.set_values.setdefault(item.leaf.predicate, set()).add(item.leaf.value)
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
-        self.unchanging = self._unchanging()
+        self.open = open_predicates(model)
+        certain = set(model.predicates) - self.derived - self.uncertain
+        self.unchanging = self._only_reading(certain - set(self.set_values))
+        self.fixed = self._only_reading(certain - self.open)
         self.loose = self._loose()
 
     def is_static(self, predicate: str) -> bool:
@@ -61,18 +64,16 @@ class Usage:
             return predicate not in self.unchanging and self.model.predicates[predicate].three_valued
         return Truth.UNKNOWN in self.set_values.get(predicate, ()) or bool(self.start.unknown.get(predicate))
 
-    def _unchanging(self) -> set[str]:
-        """Derived predicates that only read, all the way down, what never changes and is certain."""
+    def _only_reading(self, base: set[str]) -> set[str]:
+        """Derived predicates that only read, all the way down, predicates of ``base``. Where these are
+        certain and never change, so are they: ``unchanging`` in the model, ``fixed`` whatever others do."""
         found = set(self.derived)
         shrunk = True
         while shrunk:
             shrunk = False
             for rule in self.model.rules:
                 if rule.predicate in found and not all(
-                    atom.predicate in found
-                    if atom.predicate in self.derived
-                    else self.is_static(atom.predicate) and atom.predicate not in self.uncertain
-                    for atom in mf.atoms(rule.condition)
+                    atom.predicate in found or atom.predicate in base for atom in mf.atoms(rule.condition)
                 ):
                     found.discard(rule.predicate)
                     shrunk = True
@@ -107,6 +108,14 @@ def items(block: Block, around: tuple[Parameter, ...]) -> Iterator[tuple[Item, t
     for chance in block.chances:
         for _, branch in chance.branches:
             yield from items(branch, around + chance.parameters)
+
+
+def open_predicates(model: md.Model) -> frozenset[str]:
+    """Predicates whose facts may change in the world, whatever the model's actions can reach: those that an
+    effect mentions, and those declared as external."""
+    leaves = (leaf for schema in model.schemas.values() for leaf in me.leaves(schema.effect))
+    mentioned = {leaf.predicate for leaf in leaves if isinstance(leaf, me.Set)}
+    return frozenset(mentioned | {name for name, each in model.predicates.items() if each.external})
 
 
 def called(model: md.Model) -> set[str]:

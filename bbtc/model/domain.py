@@ -19,13 +19,15 @@ from bbtc.source import Span
 
 @dataclass(frozen=True, slots=True)
 class Predicate:
-    """A predicate. ``three_valued`` if anything in the model can make it unknown."""
+    """A predicate. ``three_valued`` if anything in the model can make it unknown; ``external`` if it is
+    declared as one that others change."""
 
     name: str
     parameters: tuple[Parameter, ...]
     three_valued: bool = False
     declared_three_valued: bool = False
     derived: bool = False
+    external: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
     inferred: bool = field(default=False, compare=False, repr=False)
     """Nothing declares it; it is known from its use."""

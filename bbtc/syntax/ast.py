@@ -350,13 +350,14 @@ class TypedSection:
 
 @dataclass(frozen=True, slots=True)
 class PredicateDeclaration:
-    """``(name params)`` within ``:predicates``; ``unknown`` where ``(unknown (name params))``
-    declares it three-valued."""
+    """``(name params)`` within ``:predicates``; ``(unknown (name params))`` declares it three-valued,
+    ``(external …)`` around either of these as one that others change."""
 
     name: Name
     parameters: TypedList
     three_valued: bool
     span: Span = _span()
+    external: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from bbtc.kleene import Truth
@@ -209,6 +210,10 @@ class Builder:
         unknown, head, parameters, _, close = children
         name = leaves.declared("predicate", leaves.head_name(head))
         return ast.PredicateDeclaration(name, parameters, True, between(unknown, close))
+
+    def external(self, children: list[Any]) -> ast.PredicateDeclaration:
+        predicate: ast.PredicateDeclaration = children[1]
+        return replace(predicate, external=True, span=between(children[0], children[2]))
 
     def functions(self, children: list[Any]) -> ast.Functions:
         return ast.Functions(tuple(children[1:-1]), between(children[0], children[-1]))
@@ -590,8 +595,5 @@ def _spliced(children: Iterable[Any]) -> tuple[Any, ...]:
     """Children in one tuple, runs of facts laid open."""
     found: list[Any] = []
     for child in children:
-        if isinstance(child, list):
-            found.extend(child)
-        else:
-            found.append(child)
+        found.extend(child if isinstance(child, list) else [child])
     return tuple(found)

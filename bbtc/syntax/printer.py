@@ -55,6 +55,14 @@ class _Docs:
         end = self._text.find(")", max(last, start), span.end)
         return Span(span.source, start, end + 1) if start >= 0 and end >= 0 else None
 
+    def _inside(self, span: Span | None) -> Span | None:
+        """The only form within a form."""
+        if span is None:
+            return None
+        start = self._text.find("(", span.start + 1, span.end)
+        end = self._text.rfind(")", start, span.end - 1)
+        return Span(span.source, start, end + 1) if start >= 0 and end >= 0 else None
+
     # --- files and sections ------------------------------------------------------------------
 
     def definition(self, node: ast.Definition) -> Doc:
@@ -192,12 +200,16 @@ class _Docs:
         return Doc("-", (kind,), "", Span(span.source, dash.start, end), glued=1)
 
     def predicate(self, node: ast.PredicateDeclaration) -> Doc:
-        if not node.three_valued:
-            return Doc(f"({node.name.text}", self.groups(node.parameters), ")", node.span, filled=True)
-        last = node.parameters[-1].span.end if node.parameters else node.name.span.end
-        span = self._parentheses(node.span.start + 1, last, node.span)
-        inner = Doc(f"({node.name.text}", self.groups(node.parameters), ")", span, filled=True)
-        return Doc("(unknown", (inner,), ")", node.span, glued=1)
+        marks = [
+            word for word, given in (("external", node.external), ("unknown", node.three_valued)) if given
+        ]
+        spans: list[Span | None] = [node.span]
+        for _ in marks:
+            spans.append(self._inside(spans[-1]))
+        doc = Doc(f"({node.name.text}", self.groups(node.parameters), ")", spans.pop(), filled=True)
+        for word in reversed(marks):
+            doc = Doc(f"({word}", (doc,), ")", spans.pop(), glued=1)
+        return doc
 
     def function(self, node: ast.FunctionDeclaration) -> Doc:
         last = node.parameters[-1].span.end if node.parameters else node.name.span.end

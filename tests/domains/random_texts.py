@@ -23,6 +23,7 @@ Scope = dict[str, str]
 class _Writer:
     def __init__(self, seed: int) -> None:
         self.random = random = Random(seed)
+        self.others = Random(~seed)
         every = {"o1": "a", "o2": "a", "o3": "b", "o4": random.choice(["both", _EITHER])}
         self.objects = {name: kind for name, kind in every.items() if name == "o1" or random.random() < 0.6}
         self.constants = [name for name in self.objects if random.random() < 0.5]
@@ -289,9 +290,14 @@ class _Writer:
         def listed(names: list[str]) -> str:
             return " ".join(f"{name} - {self.objects[name]}" for name in names)
 
-        predicates = " ".join(
-            f"({' '.join([name, *(f'?{place} - {kind}' for place, kind in enumerate(types))])})"
+        declared = {
+            name: f"({' '.join([name, *(f'?{place} - {kind}' for place, kind in enumerate(types))])})"
             for name, types in self.declared.items()
+        }
+        # Drawn from elsewhere, so that all else is as without it: what others change counts as constant.
+        external = {name for name in {**self.fluents, **self.static} if self.others.random() < 0.25}
+        predicates = " ".join(
+            f"(external {form})" if name in external else form for name, form in declared.items()
         )
         actions = [self.action(name) for name in ["one", "two", "three"][: self.random.randint(1, 3)]]
         count = self.random.choice([0, 0, 1, 2])

@@ -20,6 +20,7 @@ Atom = tuple[str, tuple[str, ...]]
 World = Mapping[Atom, Truth]
 Binding = Mapping[str, str]
 Change = frozenset[tuple[Atom, Truth]]
+Reachable = set[tuple[Atom, Truth]]
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 
 
@@ -108,9 +109,40 @@ def _together(parts: list[dict[Change, Fraction]]) -> dict[Change, Fraction]:
     return result
 
 
-# --- relaxed reachability --------------------------------------------------------------------
+# --- what others may change ------------------------------------------------------------------
 
-Reachable = set[tuple[Atom, Truth]]
+
+def open_predicates(model: md.Model) -> set[str]:
+    """Predicates that an effect mentions, and those that are declared as external."""
+    mentioned = {
+        leaf.predicate
+        for schema in model.schemas.values()
+        for leaf in me.leaves(schema.effect)
+        if isinstance(leaf, me.Set)
+    }
+    return mentioned | {name for name, predicate in model.predicates.items() if predicate.external}
+
+
+def well_typed(model: md.Model, atom: Atom) -> bool:
+    """Whether the arguments are of the types that the predicate is declared with."""
+    parameters = model.predicates[atom[0]].parameters
+    return all(arg in objects_of(model, p.types) for arg, p in zip(atom[1], parameters, strict=True))
+
+
+def world_values(model: md.Model, reachable: Reachable) -> dict[Atom, set[Truth]]:
+    """The values of every atom where others change what they may: unknown for those predicates only that
+    something makes unknown."""
+    found: dict[Atom, set[Truth]] = {}
+    for atom, truth in reachable:
+        found.setdefault(atom, set()).add(truth)
+    opened = open_predicates(model)
+    for atom, values in found.items():
+        if atom[0] in opened and (well_typed(model, atom) or values != {F}):
+            values |= {T, F, U} if model.predicates[atom[0]].three_valued else {T, F}
+    return found
+
+
+# --- relaxed reachability --------------------------------------------------------------------
 
 
 def all_atoms(model: md.Model) -> list[Atom]:

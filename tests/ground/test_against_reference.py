@@ -117,18 +117,22 @@ def test_what_is_reachable_is_what_enumeration_finds(text: str, sizes: list[int]
         assert not reference.may_be(model, model.goal, {}, reachable, True)
         return
     assert [action.name for action in task.actions] == sorted(actions)
-    varying = {
-        f"{name}({','.join(args)})": Truth.UNKNOWN in values
-        for (name, args), values in _possible(model).items()
-        if len(values) > 1 or values == {Truth.UNKNOWN}
-    }
-    assert {variable.name: variable.three_valued for variable in task.variables} == varying
-    assert [variable.name for variable in task.variables] == sorted(varying)
+    possible, worlds = _possible(model), reference.world_values(model, reachable)
+    varying = {atom for atom, values in possible.items() if len(values) > 1 or values == {Truth.UNKNOWN}}
+    found = {(variable.predicate, variable.args) for variable in task.variables}
+    # What the model never changes is a variable only where others may change it.
+    assert varying <= found
+    assert {name for name, _ in found - varying} <= reference.open_predicates(model)
+    for variable in task.variables:
+        assert set(variable.values) >= worlds[variable.predicate, variable.args]
+        assert variable.three_valued == (Truth.UNKNOWN in worlds[variable.predicate, variable.args])
+    names = [variable.name for variable in task.variables]
+    assert names == sorted(names)
 
 
 @_SETTINGS
 @given(lifted_texts(), bounds(), st.data())
-def test_conditions_and_outcomes_mean_the_same(text: str, sizes: list[int], data: st.DataObject) -> None:
+def test_outcomes_mean_the_same(text: str, sizes: list[int], data: st.DataObject) -> None:
     model, task = _grounded(text, sizes)
     if task is None:
         return
@@ -136,14 +140,33 @@ def test_conditions_and_outcomes_mean_the_same(text: str, sizes: list[int], data
     _, actions = reference.relaxed(model)
     world = {atom: data.draw(st.sampled_from(sorted(values))) for atom, values in sorted(possible.items())}
     state = [world[variable.predicate, variable.args] for variable in task.variables]
-    assert model.goal is not None
-    assert evaluate(task.goal, state) is reference.value(model, model.goal, {}, world)
     for action in task.actions:
         schema, binding = actions[action.name]
         applies = reference.value(model, schema.precondition, binding, world) is Truth.TRUE
-        assert (evaluate(action.precondition, state) is Truth.TRUE) == applies
         if applies and _combinations(action.factors) <= _MOST_COMBINATIONS:
             _compare_outcomes(model, task, action, world, state)
+
+
+@_SETTINGS
+@given(lifted_texts(), bounds(), st.data())
+def test_conditions_have_the_value_of_the_text_whatever_others_change(
+    text: str, sizes: list[int], data: st.DataObject
+) -> None:
+    """Facts that the model never changes, and those that it only makes true, change here as well."""
+    model, task = _grounded(text, sizes)
+    if task is None:
+        return
+    reachable, actions = reference.relaxed(model)
+    worlds = reference.world_values(model, reachable)
+    assert model.goal is not None
+    for _ in range(3):
+        world = {atom: data.draw(st.sampled_from(sorted(values))) for atom, values in sorted(worlds.items())}
+        state = [world[variable.predicate, variable.args] for variable in task.variables]
+        assert evaluate(task.goal, state) is reference.value(model, model.goal, {}, world)
+        for action in task.actions:
+            schema, binding = actions[action.name]
+            expected = reference.value(model, schema.precondition, binding, world)
+            assert evaluate(action.precondition, state) is expected
 
 
 def _combinations(factors: Iterable[Factor]) -> int:

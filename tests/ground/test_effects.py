@@ -9,7 +9,7 @@ import pytest
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground.describe import describe
 from bbtc.ground.instantiate import ground, instantiate
-from bbtc.ground.task import Factor, GroundAction, Task
+from bbtc.ground.task import Factor, GroundAction, Task, charges_of
 from bbtc.limits import Limits
 from tests.ground.examples import model_of, task_of
 
@@ -328,14 +328,33 @@ def test_the_guards_of_an_action_kept_early_matter_when_their_effect_turns_out_t
     assert [variable.name for variable in task.variables] == ["one()", "p()", "q()", "r()", "two()"]
 
 
+@pytest.mark.parametrize(
+    ("when", "charged"), [("(when (x) {})", "x()"), ("(forall (?s) (when (at ?s) {}))", "at(a)")]
+)
+def test_a_cost_under_a_condition_that_nothing_else_reads_is_counted(when: str, charged: str) -> None:
+    task = task_of(
+        f"""(define (domain d) (:predicates (x) (at ?s) (g)) (:functions (total-cost)) (:constants a b)
+      (:action flip :effect (and (not (x)) (not (at a)) (increase (total-cost) 1)))
+      (:action go :effect (and (g) {when.format("(increase (total-cost) 5)")})))
+    (define (problem p) (:domain d) (:init (x) (at a)) (:goal (g)) (:metric minimize (total-cost)))"""
+    )
+    (charge,) = charges_of(task.action_by_name["go()"].factors)
+    assert (describe(task, charge.when), charge.cost) == (charged, 5)
+    assert "flip()" in task.action_by_name, "it spares the cost"
+
+
 def test_quantifiers_side_by_side_may_use_one_name() -> None:
     task = task_of(
         """(define (domain d) (:predicates (p ?x) (q ?x) (done)) (:constants a b)
-          (:action set :effect (and (p a) (q b)))
+          (:action set :effect (and (when (p b) (q a)) (p a) (q b)))
           (:action end :precondition (and (exists (?x) (p ?x)) (exists (?x) (q ?x))) :effect (done)))
         (define (problem x) (:domain d) (:init) (:goal (done)))"""
     )
-    assert describe(task, task.action_by_name["end()"].precondition) == "(p(a) and q(b))"
+    # p(b) and q(a) are never true here, but others may make them so.
+    precondition = task.action_by_name["end()"].precondition
+    assert describe(task, precondition) == "((p(a) or p(b)) and (q(a) or q(b)))"
+    (outcome,) = task.action_by_name["set()"].factors[0].outcomes
+    assert [effect.when for effect in outcome.effects] == [None]
 
 
 def test_a_quantifier_two_levels_down_may_use_a_name_from_outside() -> None:

@@ -210,6 +210,73 @@ def test_what_no_action_changes_has_the_value_it_starts_with(
     assert cheapest.initial == Fraction(cost)
 
 
+def test_an_action_whose_precondition_rests_on_what_is_never_false_is_left_out() -> None:
+    task = task_of(
+        """(define (domain d) (:predicates (h) (k) (g)) (:derived (k) (h))
+          (:action one :precondition (not (k)) :effect (g)) (:action two :effect (g)))
+        (define (problem x) (:domain d) (:init (unknown (h)) (probabilistic 0.3 (h))) (:goal (g)))"""
+    )
+    assert ([a.name for a in task.actions], [v.name for v in task.variables]) == (["two()"], ["g()"])
+
+
+# --- what others change ----------------------------------------------------------------------
+
+_ERRAND = """(define (domain d) (:types spot)
+  (:predicates (near ?a ?b - spot) {charged} (at ?s - spot) (blocked ?s - spot) (safe ?s - spot) (done))
+  (:constants hall lab - spot)
+  (:derived (safe ?s - spot) (and {reads} (not (blocked ?s))))
+  (:action charge :precondition (not (charged)) :effect {charge})
+  (:action clear :parameters (?s - spot) :precondition (blocked ?s) :effect (not (blocked ?s)))
+  (:action go :parameters (?a ?b - spot) :precondition (and (at ?a) (near ?a ?b) (safe ?b))
+    :effect (and (not (at ?a)) (at ?b)))
+  (:action work :precondition (at lab) :effect (done)))
+(define (problem x) (:domain d) (:init (charged) (near hall lab) (at hall))
+  (:goal (and (done) (charged) (exists (?s - spot) (near ?s lab)))))"""
+
+
+@pytest.mark.parametrize(
+    ("charged", "charge"), [("(charged)", "(charged)"), ("(external (charged))", "(and)")]
+)
+def test_what_effects_mention_or_is_external_stays_and_a_map_does_not(charged: str, charge: str) -> None:
+    """The model never changes `charged` and `blocked`; derived conditions read them, too."""
+    task = task_of(_ERRAND.format(charged=charged, charge=charge, reads="(charged)"))
+    assert [action.name for action in task.actions] == ["go(hall,lab)", "work()"]
+    assert describe(task, task.goal) == "(done() and charged())"
+    go = task.action_by_name["go(hall,lab)"].precondition
+    assert describe(task, go) == "(at(hall) and charged() and not blocked(lab))"
+    names = [variable.name for variable in task.variables]
+    assert names == ["at(hall)", "at(lab)", "blocked(lab)", "charged()", "done()"]
+    assert [value.word for value in task.initial[0].values] == ["true", "false", "false", "true", "false"]
+
+
+def test_a_fact_that_nothing_mentions_is_fixed() -> None:
+    task = task_of(_ERRAND.format(charged="(charged)", charge="(and)", reads="(charged)"))
+    assert describe(task, task.goal) == "done()"
+    go = task.action_by_name["go(hall,lab)"].precondition
+    assert describe(task, go) == "(at(hall) and not blocked(lab))"
+
+
+def test_a_derived_predicate_that_never_holds_here_is_read_where_others_can_make_it_hold() -> None:
+    task = task_of(
+        """(define (domain d) (:predicates (external (lift)) (external (stairs)) (way) (g) (p))
+          (:derived (way) (and (lift) (stairs)))
+          (:action go :precondition (or (way) (p)) :effect (g)) (:action help :effect (p)))
+        (define (problem x) (:domain d) (:init (stairs)) (:goal (and (g) (not (way)))))"""
+    )
+    assert describe(task, task.action_by_name["go()"].precondition) == "((lift() and stairs()) or p())"
+    assert describe(task, task.goal) == "(g() and (not lift() or not stairs()))"
+
+
+def test_an_unreachable_goal_tells_that_only_others_could_help() -> None:
+    text = """(define (domain d) (:predicates (external (open)) (in))
+        (:action enter :precondition (open) :effect (in)))
+      (define (problem x) (:domain d) (:init) (:goal (open)))"""
+    with pytest.raises(BbtcError) as caught:
+        task_of(text)
+    (told,) = caught.value.diagnostics
+    assert (told.code, told.hint) == ("BBT0412", "only others can make `open()` true: no plan counts on that")
+
+
 @pytest.mark.parametrize(
     ("init", "code", "place"),
     [

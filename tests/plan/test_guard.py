@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import product
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bbtc.belief.simulate import simulate
+from bbtc.belief.tick import STARTED, Status, compile_tick
 from bbtc.diagnostics import LimitReached
-from bbtc.ground.condition import TRUE, conjuncts
-from bbtc.ground.task import Task
+from bbtc.ground.condition import TRUE, And, Is, Or, conjuncts, evaluate
+from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task, simulate_tree
+from bbtc.plan.guard import guarded
 from bbtc.plan.options import Options
+from bbtc.plan.result import Plan
 from bbtc.plan.strategies import STRATEGIES
-from bbtc.tree.nodes import ConditionNode, ControlNode, Tree, actions_of, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree, actions_of, walk
 from bbtc.verify.verdict import verify
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.long_form import amount
@@ -70,3 +76,44 @@ def test_what_a_limit_allows_is_guarded_too() -> None:
     assert sum(1 for _ in walk(tree.root)) <= limits.nodes
     assert tree.success_probability == simulate_tree(tree, Limits())[0].success
     assert tree.success_probability < Fraction(1)
+
+
+def test_below_a_retry_node_a_test_takes_the_place_of_a_guard_that_would_block_the_tree() -> None:
+    """The first action may make its own precondition unknown; then its attempts are used up, and the second
+    one's turn comes."""
+    ready, done, half = 0, 1, Fraction(1, 2)
+    outcomes = (
+        Outcome(half, (Effect(None, ((done, Truth.TRUE),)),)),
+        Outcome(half, (Effect(None, ((ready, Truth.UNKNOWN),)),)),
+    )
+    needed = Or((And((Is(ready, Truth.TRUE), Is(done, Truth.FALSE))), Is(done, Truth.TRUE)))
+    task = Task(
+        domain="d",
+        problem="p",
+        variables=(Variable("ready", (), True), Variable("done", (), True)),
+        initial=(InitialState(Fraction(1), (Truth.TRUE, Truth.FALSE)),),
+        goal=Is(done, Truth.TRUE),
+        actions=(
+            GroundAction("first", (), needed, (Factor(outcomes),)),
+            GroundAction("second", (), TRUE, (Factor((replace(outcomes[0], probability=Fraction(1)),)),)),
+        ),
+    )
+    first, second = (ActionNode(name, f"{name}()", latched=False) for name in ("first", "second"))
+    tries = ControlNode("tries", "retry", (first,), attempts=1)
+    root = ControlNode("root", "fallback", (ConditionNode("goal", task.goal), tries, second))
+    figures = simulate(task, root, Limits())
+    tree = Tree(task, root, Fraction(1), Fraction(1), "target-reached")
+    found = guarded(Plan(tree, figures, Fraction(0), ()), Limits())
+    assert (figures.success, figures.cost) == (1, Fraction(3, 2))
+    assert (found.figures.success, found.figures.cost) == (figures.success, figures.cost)
+    assert verify(found.tree, Limits(), "own").problems == ()
+    tick = compile_tick(task, found.tree.root)
+    starts = [node.action for node in actions_of(found.tree.root)]
+    for values in product(range(3), repeat=2):
+        status = tick(values, 0)
+        if values[done] == Truth.FALSE:
+            # Whatever the world is like, the first one starts only where its precondition is true.
+            expected = "first()" if evaluate(needed, values) is Truth.TRUE else "second()"
+            assert starts[status - STARTED] == expected
+        else:
+            assert status == (Status.SUCCESS if values[done] == Truth.TRUE else Status.RUNNING)

@@ -240,6 +240,15 @@ SECTIONS: dict[str, ast.Section] = {
         ),
         S,
     ),
+    "(:predicates (external (p)) (external (unknown (q ?x))) (external ?x) (external))": ast.Predicates(
+        (
+            ast.PredicateDeclaration(name("p"), (), False, S, external=True),
+            ast.PredicateDeclaration(name("q"), (group("?x"),), True, S, external=True),
+            ast.PredicateDeclaration(name("external"), (group("?x"),), False, S),
+            ast.PredicateDeclaration(name("external"), (), False, S),
+        ),
+        S,
+    ),
     "(:functions (total-cost) - number (d ?a ?b - t) reward)": ast.Functions(
         (
             ast.FunctionDeclaration(name("total-cost"), (), (name("number"),), S),

@@ -161,6 +161,20 @@ PAIRS = {
     (r)))
 """,
     ),
+    "what is declared as external keeps its comments": (
+        """(define (domain d) (:predicates ; all
+        (EXTERNAL (p ?x - t)) ; one
+        (external   (Unknown
+        (q ?x ; two
+        )))))""",
+        """\
+(define (domain d)
+  (:predicates ; all
+    (external (p ?x - t)) ; one
+    (external (unknown (q ?x ; two
+    )))))
+""",
+    ),
     "facts keep their rows where they do not fit on a line": (
         """(define (problem p) (:domain d) (:init (at a) (next a b)
         (next b c) (next c d)

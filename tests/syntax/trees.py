@@ -174,7 +174,17 @@ sections = st.one_of(
     build(ast.TypedSection, st.sampled_from(["types", "constants", "objects"]), typed_lists(names)),
     build(
         ast.Predicates,
-        tuples(build(ast.PredicateDeclaration, names, typed_lists(variables), st.booleans())),
+        tuples(
+            st.builds(
+                lambda name, parameters, three_valued, external: ast.PredicateDeclaration(
+                    name, parameters, three_valued, S, external
+                ),
+                names,
+                typed_lists(variables),
+                st.booleans(),
+                st.booleans(),
+            )
+        ),
     ),
     build(
         ast.Functions,

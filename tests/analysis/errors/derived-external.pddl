@@ -1,0 +1,6 @@
+(define (domain d)
+  (:predicates (external (open)) (external (unknown (warm))) (external (dark)) (lit) (in))
+  (:derived (dark) (not (lit)))
+  (:action light :effect (lit))
+  (:action enter :precondition (and (open) (warm)) :effect (in)))
+(define (problem x) (:domain d) (:init) (:goal (in)))

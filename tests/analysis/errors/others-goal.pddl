@@ -1,0 +1,5 @@
+(define (domain d)
+  (:predicates (external (open)) (external (unknown (warm))) (in) (done))
+  (:action enter :precondition (open) :effect (in))
+  (:action sit :precondition (not (warm)) :effect (when (warm) (done))))
+(define (problem x) (:domain d) (:init (unknown (warm))) (:goal (and (in) (done))))
