@@ -455,7 +455,8 @@ def test_the_command_writes_a_folder(tmp_path: Path) -> None:
     assert run("-o", "made").returncode == 0
     assert (tmp_path / "made" / "my_robot.hpp").read_text() == "mine"
     assert run().returncode == 2
-    blocked = run("-o", "tree.json")
+    (tmp_path / "notes").write_text("mine")
+    blocked = run("-o", "notes")
     assert blocked.returncode == 1
     assert "BBT0004" in blocked.stderr
 
