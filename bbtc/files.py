@@ -342,8 +342,6 @@ def _difference(path: str, old: str, new: str) -> tuple[str, tuple[str, ...]]:
         return " by a byte order mark at its start", ()
     if bare == [*wanted, ""] or wanted == [*bare, ""]:
         return " in the line end at its end", ()
-    if bare[-1] == wanted[-1] == "":
-        bare, wanted = bare[:-1], wanted[:-1]
     pairs = zip([*bare, None], [*wanted, None], strict=False)
     first = next(number for number, (one, other) in enumerate(pairs) if one != other)
     if max(len(bare), len(wanted)) - first > _MOST_COMPARED:
