@@ -129,21 +129,20 @@ def test_the_start_of_the_process_is_known() -> None:
 
 
 @pytest.fixture
-def endless_input(tmp_path: Path) -> Iterator[Path]:
+def endless_input() -> Iterator[int]:
     """A pipe that somebody holds open and writes nothing to."""
-    pipe = tmp_path / "pipe.pddl"
-    os.mkfifo(pipe)
-    writer = os.open(pipe, os.O_RDWR)
-    yield pipe
+    reader, writer = os.pipe()
+    yield reader
+    os.close(reader)
     os.close(writer)
 
 
 @needs_timers
 @pytest.mark.parametrize("command", ["check", "fmt", "compile", "plan"])
-def test_reading_what_never_comes_ends_at_the_limit(endless_input: Path, command: str) -> None:
+def test_reading_what_never_comes_ends_at_the_limit(endless_input: int, command: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", command, str(endless_input), "--time-limit", "1"],
-        capture_output=True, text=True, check=False, cwd=REPOSITORY, timeout=120,
+        [sys.executable, "-m", "bbtc.cli.main", command, "-", "--time-limit", "1"],
+        stdin=endless_input, capture_output=True, text=True, check=False, cwd=REPOSITORY, timeout=120,
     )  # fmt: skip
     assert done.returncode == 3, done.stderr
     assert "the time limit of 1 s ended reading" in done.stderr

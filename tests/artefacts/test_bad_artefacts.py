@@ -141,7 +141,7 @@ TASK_FAULTS: list[tuple[str, Edit, str, str]] = [
     ("a condition of no kind", lambda v: v.update(goal=["xor", ["true"]]), "BBT0604", "goal[0]"),
     ("an empty condition", lambda v: v.update(goal=[]), "BBT0604", "goal"),
     ("not with two parts", lambda v: v.update(goal=["not", ["true"], ["true"]]), "BBT0604", "goal"),
-    ("a deep condition", lambda v: v.update(goal=deep_condition(200)), "BBT0605", "goal[1]"),
+    ("a deep condition", lambda v: v.update(goal=deep_condition(300)), "BBT0605", "goal[1]"),
     (
         "a body with an unknown action",
         lambda v: v.update(templates=[template(type="action", action="detect()")]),

@@ -321,7 +321,7 @@ def test_a_goal_of_very_many_conditions_ends_at_the_time_limit(tmp_path: Path, h
 
 
 @pytest.mark.parametrize("command", [["check"], ["compile"], ["plan", "-q"], ["export", "--to", "prism"]])
-def test_what_a_raised_limit_on_depth_lets_in_ends_with_a_message(tmp_path: Path, command: list[str]) -> None:
+def test_what_a_raised_limit_on_depth_lets_in_is_worked_with(tmp_path: Path, command: list[str]) -> None:
     file = tmp_path / "nested.pddl"
     nested = "(not " * 880 + "(p)" + ")" * 880
     file.write_text(
@@ -329,6 +329,5 @@ def test_what_a_raised_limit_on_depth_lets_in_ends_with_a_message(tmp_path: Path
         "(:action b :effect (p)))(define (problem q) (:domain d) (:init) (:goal (g)))"
     )
     done = _run(command[0], str(file), *command[1:], "--max-depth", "900")
-    assert done.returncode == 1
-    assert "BBT0005" in done.stderr
-    assert done.stdout == ""
+    assert done.returncode == 0, done.stderr
+    assert "error" not in done.stderr

@@ -140,7 +140,7 @@ def test_an_interrupt_leaves_the_best_tree_so_far(monkeypatch: pytest.MonkeyPatc
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(policy, "finished", interrupted)
+    monkeypatch.setattr(policy, "finish", interrupted)
     again = action("again", Is(0, F), ("1/2", {0: T}), ("1/2", {}))
     of = task("a", {}, Is(0, T), again)
     tree = plan_task(of, Fraction("0.9"), "policy", Limits(), lambda _: None).tree
