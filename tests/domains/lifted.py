@@ -15,6 +15,8 @@ from functools import cached_property
 from itertools import product
 from typing import Any, TypeAlias
 
+import numpy as np
+
 Form: TypeAlias = Any
 """A word, or a list of forms."""
 Fact = tuple[str, ...]
@@ -359,10 +361,19 @@ class Space:
         choices: list[list[tuple[Fraction, list[tuple[int, Fraction]]]]],
     ) -> None:
         self.goals, self.start, self.choices = goals, start, choices
-        self._choices = [
-            [(float(cost), [(state, float(p)) for state, p in after]) for cost, after in each]
-            for each in choices
-        ]
+        # The same in flat arrays: the successors of all choices, the choices of all states that have some.
+        self._acting = np.array([number for number, each in enumerate(choices) if each], dtype=np.intp)
+        flat = [choice for each in choices for choice in each]
+        self._owners = np.array([n for n, each in enumerate(choices) for _ in each], dtype=np.intp)
+        self._costs = np.array([float(cost) for cost, _ in flat])
+        self._after = np.array([state for _, after in flat for state, _ in after], dtype=np.intp)
+        self._chances = np.array([float(p) for _, after in flat for _, p in after])
+        self._first_after = _firsts([len(after) for _, after in flat])
+        self._first_choice = _firsts([len(each) for each in choices if each])
+
+    def _expected(self, values: np.ndarray) -> np.ndarray:
+        """The expected value after each choice."""
+        return np.add.reduceat(self._chances * values[self._after], self._first_after)
 
     def mean(self, values: list[Any]) -> Any:
         """The expected value at the start."""
@@ -382,42 +393,37 @@ class Space:
     @cached_property
     def best(self) -> list[float]:
         """The best probability of ever reaching the goal from each state, to 1e-9 or so."""
-        best = [float(goal) for goal in self.goals]
-        moved = 1.0
-        while moved > 1e-13:
-            moved = 0.0
-            for number, choices in enumerate(self._choices):
-                value = before = best[number]
-                for _, after in choices:
-                    found = 0.0
-                    for state, p in after:
-                        found += p * best[state]
-                    value = max(value, found)
-                moved, best[number] = max(moved, value - before), value
-        return best
+        best = np.array(self.goals, dtype=float)
+        acting, moved = self._acting, 1.0 if len(self._acting) else 0.0
+        while moved > 1e-14:
+            found = np.maximum(best[acting], np.maximum.reduceat(self._expected(best), self._first_choice))
+            moved = float((found - best[acting]).max())
+            best[acting] = found
+        values: list[float] = best.tolist()
+        return values
 
     def least_cost(self) -> float | None:
         """The least cost of reaching the goal as probably as possible, or of ending where it is out of
         reach; None where actions may cost nothing."""
-        best = self.best
-        kept = []
-        for number, choices in enumerate(self._choices):
-            if best[number] > 0 and choices:
-                if any(own <= 0 for own, _ in choices):
-                    return None
-                chosen = (
-                    (own, after)
-                    for own, after in choices
-                    if sum(p * best[state] for state, p in after) > best[number] - 1e-9
-                )
-                kept.append((number, list(chosen)))
-        cost, moved = [0.0] * len(best), 1.0
-        while moved > 1e-11:
-            moved = 0.0
-            for number, choices in kept:
-                value = min(own + sum(p * cost[state] for state, p in after) for own, after in choices)
-                moved, cost[number] = max(moved, abs(value - cost[number]) / (1 + value)), value
-        return float(self.mean(cost))
+        best, cost = np.array(self.best), np.zeros(len(self.goals))
+        if not len(self._acting):
+            return 0.0
+        matter = best[self._owners] > 0
+        if (matter & (self._costs <= 0)).any():
+            return None
+        best_ones = self._expected(best) > best[self._owners] - 1e-9
+        acting, moved = self._acting[best[self._acting] > 0], 1.0 if (best[self._acting] > 0).any() else 0.0
+        while moved > 1e-12:
+            each = np.where(best_ones, self._costs + self._expected(cost), np.inf)
+            found = np.minimum.reduceat(each, self._first_choice)[best[self._acting] > 0]
+            moved = float((abs(found - cost[acting]) / (1 + found)).max())
+            cost[acting] = found
+        return float(self.mean(cost.tolist()))
+
+
+def _firsts(lengths: list[int]) -> np.ndarray:
+    """Where each of some parts of such lengths begins, laid end to end."""
+    return np.cumsum([0, *lengths])[:-1]
 
 
 def _together(parts: Iterable[Draws]) -> Draws:
