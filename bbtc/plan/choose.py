@@ -80,7 +80,7 @@ class Chooser:
         self.task = task
         self.transitions = transitions
         self.limits = limits
-        self.reachability = RelaxedReachability(task)
+        self.reachability = RelaxedReachability(task, limits)
         self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
         self._helps: dict[tuple[Subgoal, int, Truth, Values, frozenset[str]], bool] = {}

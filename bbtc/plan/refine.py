@@ -149,13 +149,14 @@ def refine(
     Raises :class:`bbtc.diagnostics.LimitReached` only if the limits do not even allow the
     simulation of the initial belief.
     """
+    draft = Draft.start(task)
+    kept = BestTree.start(task, target, options.best, freeze(draft, limits).root, limits)
     transitions: dict[str, Transition] = {}
     finder = TargetFinder(task, Chooser(task, transitions, limits))
-    refiner = _Refiner(task, target, limits, Draft.start(task), transitions, finder)
+    refiner = _Refiner(task, target, limits, draft, transitions, finder)
     refinements: list[Refinement] = []
     status: PlanStatus = "stuck"
     stop: Diagnostic | None = None
-    kept = BestTree.start(task, target, options.best, freeze(refiner.draft, limits).root, limits)
     best = base = current = refiner.simulate()  # the base: where progress was last made
     since_base: list[_Change] = []
 

@@ -22,6 +22,7 @@ from bbtc.belief.state import Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth, negate
+from bbtc.limits import Limits
 from bbtc.rounding import LARGEST, rounded
 
 Costs: TypeAlias = npt.NDArray[np.float64]
@@ -29,6 +30,7 @@ Index: TypeAlias = npt.NDArray[np.int64]
 
 _NEVER = float("inf")
 _KEPT_BYTES = 1 << 26
+_ACTIONS_AT_ONCE = 64  # indexed between two looks at the limits
 _LEAST_COST = 2.0**-10
 _LEAST_PROBABILITY = 1 / LARGEST
 """What an action costs at least here, so that longer ways cost more."""
@@ -81,9 +83,10 @@ def possible(condition: Condition, facts: Facts) -> bool:
 
 
 class RelaxedReachability:
-    """The relaxation of a task, indexed once and asked for many states."""
+    """The relaxation of a task, indexed once and asked for many states. To make it raises
+    :class:`bbtc.diagnostics.LimitReached`."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, limits: Limits) -> None:
         self.task = task
         self.operators: list[Operator] = []
         self._base: list[float] = []
@@ -93,6 +96,8 @@ class RelaxedReachability:
         self._always = 3 * len(task.variables)  # a fact that holds, and one that never does
         self._count = self._always + 2
         for number, action in enumerate(task.actions):
+            if number % _ACTIONS_AT_ONCE == 0:
+                limits.check_time("planning")
             needs = self._body(action.precondition)
             cost = max(rounded(action.cost), _LEAST_COST)
             for operator in operators_of(number, action.factors):

@@ -66,7 +66,7 @@ class Moves:
     def __init__(self, task: Task, limits: Limits) -> None:
         self.task = task
         self.limits = limits
-        self.relaxed = RelaxedReachability(task)
+        self.relaxed = RelaxedReachability(task, limits)
 
     def insertions(self, subgoals: Iterable[Subgoal], draft: Draft, values: Values) -> list[Insertion]:
         """What may be inserted for any of some subgoals that are not true in a state, best first."""

@@ -121,7 +121,7 @@ class RootFinder:
     def __init__(self, task: Task, limits: Limits) -> None:
         self._task = task
         self._limits = limits
-        self._relaxed = RelaxedReachability(task)
+        self._relaxed = RelaxedReachability(task, limits)
         self._makers: dict[_Fact, list[tuple[GroundAction, Effect]]] = {}
         for action in task.actions:
             for effect in effects_of(action.factors):
