@@ -311,7 +311,8 @@ class Drafting:
 
 
 def written_size(program: Program) -> int:
-    """How many atoms the program has with all formulas written out, as the tools that read it do."""
+    """How many atoms, and words that join them, the program has with all formulas written out, as the tools
+    that read it do."""
     sizes: list[int] = []
     for formula in program.formulas:
         sizes.append(_size(formula.expression, sizes))

@@ -167,3 +167,14 @@ def test_to_give_what_is_missing_puts_the_goal_within_reach() -> None:
                 break
     assert tried
     assert mended >= tried * 0.8, (mended, tried)
+
+
+def test_a_derived_fact_that_may_be_false_is_not_what_is_missing() -> None:
+    """Here it is false; what could make it so at all is not followed."""
+    model = model_of("""(define (domain track) (:predicates (jammed) (blocked) (fuelled) (there))
+      (:derived (blocked) (jammed))
+      (:action jam :effect (jammed))
+      (:action drive :precondition (and (not (blocked)) (fuelled)) :effect (there)))
+    (define (problem ahead) (:domain track) (:init) (:goal (there)))""")
+    hints = [doubt.hint for doubt in _doubts(model)]
+    assert hints == ["`drive` needs `fuelled()`, and no action makes it so, nor does `:init` give it"]
