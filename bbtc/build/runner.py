@@ -261,13 +261,16 @@ class _Builder:
 
         found = {}
         for path, data in files.items():
+            if path not in begun:
+                found[path] = data
+                continue
             shown = source_name(self.folder, path)
             try:
-                old = self.contents.read(path) if path in begun else None
+                old = self.contents.read(path)
             except FileNotFoundError:
                 old = None
             except OSError as error:
-                raise BbtcError.single("BBT0004", f"cannot read {shown}: {error.strerror}") from error
+                raise BbtcError.single("BBT0004", f"cannot read {shown}: {reason(error)}") from error
             place = place_of(path, old, data, shown=shown, check=self.held is None)
             diagnostics.extend([place.warning] if place.warning is not None else [])
             if place.path is not None:

@@ -20,7 +20,7 @@ from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine, on_terminal, tell
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report, Severity
-from bbtc.files import Outputs, read_file, require_apart, require_writable
+from bbtc.files import Outputs, read_file, reason, require_apart, require_writable
 from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.printable import printable
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
@@ -132,7 +132,7 @@ class Session:
             try:
                 old = read_file(path, self.limits.file_bytes)
             except OSError as error:
-                raise BbtcError.single("BBT0004", f"cannot read {path}: {error.strerror}") from error
+                raise BbtcError.single("BBT0004", f"cannot read {path}: {reason(error)}") from error
             place = place_of(name, old, text.encode(), shown=str(path), check=check)
             if place.path is not None:
                 found[place.path] = text
