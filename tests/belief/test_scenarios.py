@@ -56,3 +56,18 @@ def test_listing_and_sampling_end_at_the_limit() -> None:
         list(runs)
     with pytest.raises(LimitReached, match="sampling"):
         sample(chain, 10**9, 0, Limits(seconds=0.2))
+
+
+def test_sampled_runs_end_as_often_as_they_do() -> None:
+    """A toss that is won, lost, or followed by waiting without end, which is cut off; 4 standard deviations."""
+    toss = action("toss", TRUE, ("1/2", {0: T}), ("1/4", {}), ("1/4", {1: T}))
+    of = two_facts(toss, action("wait", Is(1, T), ("1", {})))
+    waiting = ControlNode(
+        "n1", "sequence", (ConditionNode("n2", Is(1, T)), ActionNode("n3", "wait()", latched=False))
+    )
+    tossing = ControlNode("n4", "sequence", (ActionNode("n5", "toss()"), ConditionNode("n6", Is(0, T))))
+    root = ControlNode("n7", "fallback", (ConditionNode("n8", Is(0, T)), waiting, tossing))
+    found = sample(explore(of, root, Limits()), 1600, 0, Limits(), max_steps=50)
+    assert found.samples == 1600
+    assert abs(found.successes - 800) <= 80
+    assert abs(found.cut - 400) <= 70

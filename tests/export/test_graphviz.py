@@ -170,6 +170,8 @@ def test_long_texts_are_broken_and_cut() -> None:
     assert len(lines) == 8
     assert lines[-1] == "…"
     assert max(map(len, wrap("x" * 1000))) <= 60
+    name = "the-arm-of-the-left-robot-is-holding-something"
+    assert wrap(f"not ({name}) now") == ["not", f"({name})", "now"], "a name is not broken at its hyphens"
 
 
 # --- any names -------------------------------------------------------------------------------

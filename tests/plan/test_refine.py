@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bbtc.belief.chain import explore
 from bbtc.belief.simulate import simulate
 from bbtc.belief.soundness import violations
-from bbtc.ground.condition import Condition, Is, Or, conjunction
+from bbtc.ground.condition import TRUE, Condition, Is, Or, conjunction
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -77,6 +77,15 @@ def test_a_threat_moves_the_branch_that_undoes_the_goal() -> None:
     )
     assert done.tree.status == "target-reached"
     assert [step.kind for step in done.refinements].count("move") == 1
+
+
+def test_an_action_that_needs_what_is_wanted_does_not_achieve_it() -> None:
+    """Though it would, each time, where that holds already."""
+    boil = action("boil", TRUE, ("1/4", {0: T}), ("3/4", {}))
+    reheat = action("reheat", Is(0, T), ("1", {0: T}))
+    done = plan(task("hot", {}, Is(0, T), boil, reheat), "7/16")
+    assert [step.inserted for step in done.refinements] == ["boil()", "boil()"]
+    assert done.tree.success_probability == Fraction(7, 16)
 
 
 def test_an_actuation_with_an_unknown_result_is_checked_after() -> None:
