@@ -119,11 +119,8 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--count", type=int, default=150, help="how many mutants")
     parser.add_argument("--seed", type=int, default=0, help="which ones")
     parser.add_argument("--jobs", type=int, default=2, help="how many at a time")
-    parser.add_argument(
-        "--timeout", type=float, help="seconds for the tests of one; by default from a run of all"
-    )
+    parser.add_argument("--timeout", type=float, default=900, help="seconds for the tests of one")
     parser.add_argument("--file", help="all mutants of this module in the place of a sample")
-    parser.add_argument("--trusted", action="store_true", help="the tests are known to pass without a mutant")
     parser.add_argument("--list", action="store_true", help="only list them")
     options = parser.parse_args(arguments)
     project = repository()
@@ -135,8 +132,7 @@ def main(arguments: Sequence[str]) -> int:
         for mutant in mutants:
             print(named(mutant))
         return 0
-    limit = options.timeout or (900 if options.trusted else None)
-    found = try_all(project, mutants, options.jobs, limit, _told, trusted=options.trusted)
+    found = try_all(project, mutants, options.jobs, options.timeout, _told)
     lines, good = report(found, explained(EQUIVALENT))
     print("\n".join(lines))
     return 0 if good else 1
