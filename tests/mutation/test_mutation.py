@@ -113,6 +113,9 @@ def test_a_sample_is_drawn_by_its_seed(toy: Project) -> None:
     assert sorted(each.key for each in every) == sorted(each.key for each in _changes(toy).values())
     assert drawn(toy, 3, 5) == drawn(toy, 3, 5)
     assert len({tuple(each.key for each in drawn(toy, 3, seed)) for seed in range(10)}) > 1
+    (toy.root / "toy/sums.py").write_text(_SUMS.replace("    return found\n", "    return found + 0\n"))
+    new = drawn(toy, 100, 0)
+    assert [each.key for each in new if "+ 0" not in each.original] == [each.key for each in every]
 
 
 def test_the_tests_that_run_a_line_are_tried_quick_ones_first(toy: Project) -> None:
