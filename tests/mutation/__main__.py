@@ -38,14 +38,24 @@ PACKAGES = {
         "tests/analysis",
         "tests/cli/test_limits.py",
     ),
-    "bbtc/plan": (
+    "bbtc/planner": (
         *_WHOLE,
         "tests/plan",
         "tests/verify/test_plans.py",
         "tests/domains/test_against_lifted.py",
     ),
-    "bbtc/verify": (*_WHOLE, "tests/verify", "tests/export/test_text_formats.py", "tests/cli/test_limits.py"),
-    "bbtc/export": (
+    "bbtc/rewrite": (
+        *_WHOLE,
+        "tests/plan",
+        "tests/belief/test_retry.py",
+    ),
+    "bbtc/verifier": (
+        *_WHOLE,
+        "tests/verify",
+        "tests/export/test_text_formats.py",
+        "tests/cli/test_limits.py",
+    ),
+    "bbtc/backends": (
         "tests/export/test_names.py",
         "tests/export/test_text_formats.py",
         "tests/export/test_graphviz.py",

@@ -17,9 +17,9 @@ from bbtc.ground.task import Effect, Factor, GroundAction, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.options import Options, Retries
-from bbtc.plan.result import Plan
-from bbtc.plan.simplify import size
+from bbtc.planner.options import Options, Retries
+from bbtc.planner.result import Plan
+from bbtc.rewrite.simplify import size
 from bbtc.tree.nodes import actions_of, retries_of
 from bbtc.tree.validate import check_tree
 from tests.plan.examples import Optimum, cases

@@ -14,9 +14,10 @@ from bbtc.ground.condition import TRUE, Is, evaluate
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan import space_actions, space_packing
-from bbtc.plan.space import StateSpace, explore_space
-from bbtc.plan.space_table import StateTable
+from bbtc.planner.mdp import packing as space_packing
+from bbtc.planner.mdp import transitions as space_actions
+from bbtc.planner.mdp.explore import StateSpace, explore_space
+from bbtc.planner.mdp.state_table import StateTable
 from tests.strategies import tasks
 
 Step = tuple[str, Values, Fraction, Fraction]

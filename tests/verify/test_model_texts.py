@@ -8,18 +8,18 @@ from itertools import pairwise
 
 import pytest
 
+from bbtc.backends.models.jani import jani
+from bbtc.backends.models.jani import task_text as jani_task
+from bbtc.backends.models.prism import prism
+from bbtc.backends.models.prism import task_text as prism_task
 from bbtc.belief.simulate import simulate
 from bbtc.diagnostics import BbtcError
-from bbtc.export.jani import jani
-from bbtc.export.jani import task_text as jani_task
-from bbtc.export.prism import prism
-from bbtc.export.prism import task_text as prism_task
 from bbtc.ground.condition import Is
 from bbtc.ground.task import Charge, Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
-from bbtc.verify.verdict import verify
+from bbtc.verifier.verdict import verify
 from tests.long_form import amount
 from tests.verify.test_storm import ask, ask_about_jani
 
