@@ -13,7 +13,9 @@ _OBJECTS = [f"o{number}" for number in range(9)]
 def test_a_condition_of_a_hundred_parts_has_the_bindings_that_brute_force_finds() -> None:
     """Each part holds of all objects, or all pairs but one; some deny, one compares, one may bind."""
     random = Random(3)
-    parts, facts, tests = [], [], []
+    parts: list[str] = []
+    facts: list[str] = []
+    tests: list[tuple[list[str], set[tuple[str, ...]]]] = []
     for number in range(100):
         variables = random.sample("xyz", random.choice([1, 2]))
         rows = list(itertools.product(_OBJECTS, repeat=len(variables)))
