@@ -129,6 +129,9 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--count", type=int, default=150, help="how many mutants")
     parser.add_argument("--seed", type=int, default=0, help="which ones")
     parser.add_argument("--jobs", type=int, default=2, help="how many at a time")
+    parser.add_argument(
+        "--most", type=float, default=60, help="seconds that the tests chosen for one mutant take without it"
+    )
     parser.add_argument("--timeout", type=float, default=900, help="seconds for the tests of one")
     parser.add_argument("--file", help="all mutants of this module in the place of a sample")
     parser.add_argument("--list", action="store_true", help="only list them")
@@ -142,7 +145,7 @@ def main(arguments: Sequence[str]) -> int:
         for mutant in mutants:
             print(named(mutant))
         return 0
-    found = try_all(project, mutants, options.jobs, options.timeout, _told)
+    found = try_all(project, mutants, options.jobs, options.timeout, _told, options.most)
     lines, good = report(found, explained(EQUIVALENT))
     print("\n".join(lines))
     return 0 if good else 1

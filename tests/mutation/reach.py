@@ -6,6 +6,8 @@ import ast
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import accumulate
+from math import inf
 from pathlib import Path
 
 _DURATION = re.compile(r"^(\d+\.\d+)s (?:setup|call|teardown) +(\S.*)$")
@@ -25,9 +27,11 @@ class Reach:
         found = self.tests.get(file, {})
         return frozenset().union(*(found.get(line, ()) for line in lines))
 
-    def quick_first(self, tests: Iterable[str]) -> list[str]:
-        """The tests, those that take long last."""
-        return sorted(tests, key=lambda test: (self.seconds.get(test, 0.0), test))
+    def quick_first(self, tests: Iterable[str], most: float = inf) -> list[str]:
+        """The tests, those that take long last; of many, those that together take at most so many seconds."""
+        ordered = sorted(tests, key=lambda test: (self.seconds.get(test, 0.0), test))
+        until = accumulate(self.seconds.get(test, 0.0) for test in ordered)
+        return [test for test, end in zip(ordered, until, strict=True) if end <= most] or ordered[:1]
 
 
 def reach_of(root: Path, data: Path, output: str) -> Reach:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -81,20 +82,18 @@ def test_files(project: Project, package: str) -> list[str]:
     return list(files)
 
 
-def selection(project: Project, reach: Reach, mutant: Mutant) -> list[str]:
-    """The tests to run for a mutant, quick ones first: those that run the changed lines; where no test does
-    (a line may have no instruction of its own), those that run the function; and for what runs while modules
-    are imported, the files of tests of its package."""
+def selection(project: Project, reach: Reach, mutant: Mutant, most: float = inf) -> list[str]:
+    """The tests to run for a mutant, quick ones first, as many as take at most so many seconds together: those
+    that run the changed lines; where no test does (a line may have no instruction of its own), those that run
+    the function; for what runs while modules are imported, those that run anything of the module."""
     source = (project.root / mutant.file).read_text("utf-8")
     lines = lines_of(source, mutant.start, mutant.end)
     tests = reach.running(mutant.file, lines) or reach.running(
         mutant.file, function_around(source, mutant.line)
     )
-    chosen = reach.quick_first(tests - {IMPORTED})
     if IMPORTED in tests:
-        package = next(name for name in project.packages if mutant.file.startswith(f"{name}/"))
-        chosen.extend(test_files(project, package))
-    return chosen
+        tests = reach.running(mutant.file, range(source.count("\n") + 2))
+    return reach.quick_first(tests - {IMPORTED}, most)
 
 
 class Copies:
@@ -177,10 +176,11 @@ def measured(project: Project, copies: Copies, packages: Iterable[str], jobs: in
     return reach
 
 
-def tried(copies: Copies, reach: Reach, mutant: Mutant, seconds: float) -> Tried:
-    """What the tests say of a mutant. No test that reaches it: it survives. A status of pytest that tells of
-    no tests is an error of the trial; what fails while it is imported is noticed, too."""
-    tests = selection(copies.project, reach, mutant)
+def tried(copies: Copies, reach: Reach, mutant: Mutant, seconds: float, most: float = inf) -> Tried:
+    """What the tests say of a mutant; ``most`` as in :func:`selection`. No test that reaches it: it survives.
+    A status of pytest that tells of no tests is an error of the trial; what fails while it is imported is
+    noticed, too."""
+    tests = selection(copies.project, reach, mutant, most)
     begun = time.monotonic()
     if not tests:
         return Tried(mutant, "survived", "", 0.0)
@@ -201,17 +201,22 @@ def tried(copies: Copies, reach: Reach, mutant: Mutant, seconds: float) -> Tried
 
 
 def try_all(
-    project: Project, mutants: Sequence[Mutant], jobs: int, seconds: float, tell: Callable[[Tried], None]
+    project: Project,
+    mutants: Sequence[Mutant],
+    jobs: int,
+    seconds: float,
+    tell: Callable[[Tried], None],
+    most: float = inf,
 ) -> list[Tried]:
     """What became of each mutant, in their order. Raises ``RuntimeError`` if the tests fail without any.
-    ``seconds``: for the tests of one mutant."""
+    ``seconds``: for the tests of one mutant; ``most`` as in :func:`selection`."""
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copies = Copies(project, Path(folder), jobs)
         packages = [name for name in project.packages if any(m.file.startswith(f"{name}/") for m in mutants)]
         reach = measured(project, copies, packages, jobs)
 
         def one(mutant: Mutant) -> Tried:
-            done = tried(copies, reach, mutant, seconds)
+            done = tried(copies, reach, mutant, seconds, most)
             tell(done)
             return done
 
