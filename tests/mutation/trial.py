@@ -83,9 +83,9 @@ def test_files(project: Project, package: str) -> list[str]:
 
 
 def selection(project: Project, reach: Reach, mutant: Mutant, most: float = inf) -> list[str]:
-    """The tests to run for a mutant, quick ones first, as many as take at most so many seconds together: those
-    that run the changed lines; where no test does (a line may have no instruction of its own), those that run
-    the function; for what runs while modules are imported, those that run anything of the module."""
+    """The tests to run for a mutant, quick ones first, as many as take at most so many seconds together:
+    those that run the changed lines; where no test does (a line may have no instruction of its own), those
+    that run the function; for what runs while modules are imported, those that run anything of the module."""
     source = (project.root / mutant.file).read_text("utf-8")
     lines = lines_of(source, mutant.start, mutant.end)
     tests = reach.running(mutant.file, lines) or reach.running(
