@@ -40,7 +40,7 @@ class FailureFinder:
         self._task = task
         self._tick = compile_tick(task, root, self._observe)
         counters = memory_of(root).counters
-        self._counters = {node.id: counters[i] for i, node in enumerate(actions_of(root)) if counters[i]}
+        self._counters = {node.id: counters[i] for i, node in enumerate(actions_of(root))}
 
     def _observe(self, node: Node, status: int) -> None:
         if not isinstance(node, ControlNode) and status < Status.SUCCESS:
@@ -83,7 +83,7 @@ class FailureFinder:
                 continue
             if self._lacks_precondition(node, state):
                 continue
-            for counter in self._counters.get(node.id, ()):
+            for counter in self._counters[node.id]:
                 if counter.used_up(state.finished):
                     return counter.node
         return None

@@ -9,7 +9,8 @@ import pytest
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground.describe import describe
 from bbtc.ground.instantiate import ground, instantiate
-from bbtc.ground.task import Factor, GroundAction, Task, charges_of
+from bbtc.ground.task import Factor, GroundAction, Task, charges_of, effects_of
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from tests.ground.examples import model_of, task_of
 
@@ -407,3 +408,20 @@ def test_numbers_whose_exact_value_grows_without_bound_are_refused(effect: str, 
         _task(effect, metric="(:metric minimize (total-cost))" if metric else "")
     assert {diagnostic.code for diagnostic in caught.value.diagnostics} == {"BBT0113"}
     assert all(diagnostic.span is not None for diagnostic in caught.value.diagnostics)
+
+
+def test_what_an_action_sets_in_vain_is_left_out_for_these_arguments_only() -> None:
+    """Only the hall is ever dirty: to clean the attic sets one fact, to clean the hall sets two."""
+    task = task_of("""(define (domain d) (:predicates (seen ?r) (dirty ?r))
+      (:action clean :parameters (?r) :effect (and (not (dirty ?r)) (seen ?r))))
+    (define (problem p) (:domain d) (:objects attic hall) (:init (dirty hall))
+      (:goal (and (seen attic) (seen hall) (not (dirty hall)))))""")
+    names = [variable.name for variable in task.variables]
+    sets = {
+        action.name: {(names[v], value) for effect in effects_of(action.factors) for v, value in effect.sets}
+        for action in task.actions
+    }
+    assert sets == {
+        "clean(attic)": {("seen(attic)", Truth.TRUE)},
+        "clean(hall)": {("dirty(hall)", Truth.FALSE), ("seen(hall)", Truth.TRUE)},
+    }
