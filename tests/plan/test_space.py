@@ -89,8 +89,8 @@ def test_actions_with_very_many_outcomes_and_disjuncts_take_another_way_to_the_s
     assert by_arrays(space) == by_simulator(task)
 
 
-def lamps(count: int) -> Task:
-    """Any lamp can be switched on; over 64 of them take more than one word."""
+def lamps(count: int, off: int = 3) -> Task:
+    """Any lamp can be switched on, but for the last ones all are; over 64 of them take more than one word."""
     switches = tuple(
         GroundAction(
             "switch", (f"{i:03}",), Is(i, Truth.FALSE), (Factor((Outcome(Fraction(1), (_on(i),)),)),)
@@ -98,7 +98,7 @@ def lamps(count: int) -> Task:
         for i in range(count)
     )
     variables = tuple(Variable("lit", (f"{i:03}",), three_valued=i % 2 == 0) for i in range(count))
-    start = tuple(Truth.TRUE if i < count - 3 else Truth.FALSE for i in range(count))
+    start = tuple(Truth.TRUE if i < count - off else Truth.FALSE for i in range(count))
     last = Is(count - 1, Truth.TRUE)
     return Task("lamps", "all", variables, (InitialState(Fraction(1), start),), last, switches)
 
@@ -112,6 +112,13 @@ def test_states_of_several_words() -> None:
     assert space.packing.words == 4
     # The last lamp ends it: the subsets of the two others, with and without it.
     assert (len(space.states), int(space.goal.sum())) == (8, 4)
+    assert by_arrays(space) == by_simulator(space.task)
+
+
+def test_many_states_at_once_and_many_actions() -> None:
+    """Of a level of 252 states, each with 300 actions of which few apply."""
+    space = explore_space(lamps(300, off=10), Limits())
+    assert len(space.states) == 2**10
     assert by_arrays(space) == by_simulator(space.task)
 
 
