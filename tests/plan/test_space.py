@@ -107,6 +107,10 @@ def _on(variable: int) -> Effect:
     return Effect(None, ((variable, Truth.TRUE),))
 
 
+def _off(variable: int) -> Factor:
+    return Factor((Outcome(Fraction(1), (Effect(None, ((variable, Truth.FALSE),)),)),))
+
+
 def test_states_of_several_words() -> None:
     space = explore_space(lamps(150), Limits())
     assert space.packing.words == 4
@@ -116,8 +120,16 @@ def test_states_of_several_words() -> None:
 
 
 def test_many_states_at_once_and_many_actions() -> None:
-    """Of a level of 252 states, each with 300 actions of which few apply."""
-    space = explore_space(lamps(300, off=10), Limits())
+    """Levels of 126 states to expand, each with 600 actions of which few apply: some need what is false, some
+    what is true."""
+    task = lamps(600, off=5)
+    flipped = [
+        dataclasses.replace(each, precondition=Is(i, Truth.TRUE), factors=(_off(i),))
+        if 150 <= i < 155
+        else each
+        for i, each in enumerate(task.actions)
+    ]
+    space = explore_space(dataclasses.replace(task, actions=tuple(flipped)), Limits())
     assert len(space.states) == 2**10
     assert by_arrays(space) == by_simulator(space.task)
 
