@@ -425,3 +425,17 @@ def test_what_an_action_sets_in_vain_is_left_out_for_these_arguments_only() -> N
         "clean(attic)": {("seen(attic)", Truth.TRUE)},
         "clean(hall)": {("dirty(hall)", Truth.FALSE), ("seen(hall)", Truth.TRUE)},
     }
+
+
+@pytest.mark.parametrize(
+    ("metric", "kept"), [("(:metric maximize (reward))", ["shut()", "wave()"]), ("", ["shut()"])]
+)
+def test_what_earns_a_reward_matters_where_rewards_count(metric: str, kept: list[str]) -> None:
+    """Nobody asks whether somebody waved, or sang for a fee."""
+    task = task_of(f"""(define (domain d) (:requirements :rewards :action-costs)
+      (:predicates (closed) (waved) (sung)) (:functions (total-cost))
+      (:action shut :effect (closed))
+      (:action wave :effect (and (waved) (increase (reward) 2)))
+      (:action sing :effect (and (sung) (increase (total-cost) 2))))
+    (define (problem p) (:domain d) (:init) (:goal (closed)) {metric})""")
+    assert [action.name for action in task.actions] == kept
