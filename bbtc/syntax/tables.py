@@ -157,18 +157,13 @@ def _production(rule: Mapping[str, Any], rules: Iterable[Mapping[str, Any]]) -> 
     if origin.startswith("_"):
         return Production(origin, len(expansion), (), None, False, expansion[0] == origin)
     single = bool(rule["options"]["expand1"]) and len(expansion) == 1 and alias is None
-    same = (_expansion(each) for each in rules if (each["origin"]["name"], each["alias"]) == (origin, alias))
-    empty = next((_lists(other) for other in same if _lists(other) and _others(other) == expansion), ())
+    empty: tuple[int, ...] = ()
+    for other in (_expansion(each) for each in rules if each["origin"] == rule["origin"]):
+        # An underscore marks the names of the rules that Lark makes for `item*` and `item+`.
+        lists = tuple(at for at, name in enumerate(other) if name.startswith("_"))
+        if lists and expansion == [name for name in other if not name.startswith("_")]:
+            empty = lists
     return Production(origin, len(expansion), empty, alias or origin, single, False)
-
-
-def _lists(expansion: list[str]) -> tuple[int, ...]:
-    """Positions of the rules that Lark makes for ``item*`` and ``item+``: an underscore marks their names."""
-    return tuple(at for at, name in enumerate(expansion) if name.startswith("_"))
-
-
-def _others(expansion: list[str]) -> list[str]:
-    return [name for name in expansion if not name.startswith("_")]
 
 
 # --- text ------------------------------------------------------------------------------------
