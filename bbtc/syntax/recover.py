@@ -47,7 +47,7 @@ class _Recovery:
     """The faults of a text, gathered step by step."""
 
     def __init__(self, text: str, source: SourceFile, engine: Engine) -> None:
-        self._engine = engine
+        self._source, self._engine = source, engine
         self._keywords = keywords(engine.terminals)
         self._foreign, text = foreign_characters(text)
         self._balance = Balance(text).run()
@@ -65,7 +65,7 @@ class _Recovery:
             text = edited.decode("ascii")
             work += len(text)
             try:
-                return self._engine.parse(text)  # type: ignore[no-any-return]
+                return self._engine.parse(text, self._source)  # type: ignore[no-any-return]
             except Unexpected as error:
                 place = Place(text, error.position, self._engine.accepted(error.stack), self._keywords)
                 fault, forms = explain(place)

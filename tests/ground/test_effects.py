@@ -45,6 +45,69 @@ def _words(task: Task, factor: Factor) -> str:
     return " | ".join(outcomes)
 
 
+RULES = {
+    1: [("(forall (?x - t) (s ?x))", ["1: s(a)=true s(b)=true s(c)=true"])],
+    2: [
+        ("(and (r) (when (fixed a) (not (q))) (when (fixed b) (not (p))))", ["1: q()=false r()=true"]),
+        ("(when (or (fixed a) (p)) (not (q)))", ["1: q()=false"]),
+        ("(when (and (fixed a) (p)) (and (not (p)) (not (q))))", ["1: [p()] p()=false q()=false"]),
+    ],
+    3: [
+        (
+            "(when (q) (probabilistic 0.5 (not (p)) 0.5 (not (q))))",
+            ["1/2: [q()] p()=false | 1/2: [q()] q()=false"],
+        ),
+    ],
+    4: [
+        ("(and (not (p)) (unknown (p)) (q) (not (q)))", ["1: p()=unknown q()=true"]),
+        (
+            "(when (p) (and (not (p)) (unknown (p)) (r) (not (r))))",
+            ["1: [p()] p()=unknown r()=true"],
+        ),
+    ],
+    5: [
+        (
+            "(probabilistic 0.5 (probabilistic 0.2 (not (p)) 0.8 (not (q))) 0.5 (r))",
+            ["1/10: p()=false | 2/5: q()=false | 1/2: r()=true"],
+        ),
+        (
+            "(probabilistic 0.5 (oneof (not (p)) (not (q))) 0.5 (r))",
+            ["1/2: <1/2: p()=false | 1/2: q()=false> | 1/2: r()=true"],
+        ),
+    ],
+    6: [
+        ("(probabilistic 0.3 (r) 0.5 (not (p)) 0.2 (r))", ["1/2: r()=true | 1/2: p()=false"]),
+        (
+            "(probabilistic 0.3 (when (p) (r)) 0.5 (not (p)) 0.2 (when (p) (r)))",
+            ["1/2: [p()] r()=true | 1/2: p()=false"],
+        ),
+    ],
+    7: [
+        ("(and (not (p)) (probabilistic 0.4 (r) 0.6 (r)))", ["1: p()=false r()=true"]),
+        (
+            "(and (probabilistic 0.4 (r) 0.6 (r)) (probabilistic 0.5 (not (p))))",
+            ["1/2: p()=false r()=true | 1/2: r()=true"],
+        ),
+    ],
+    8: [
+        (
+            "(and (r) (probabilistic 0.2 (not (p)) 0.8 (not (q))))",
+            ["1/5: p()=false r()=true | 4/5: q()=false r()=true"],
+        ),
+        (
+            "(and (probabilistic 0.2 (not (p))) (probabilistic 0.5 (not (q))) (r))",
+            ["1: r()=true", "1/5: p()=false | 4/5:", "1/2: q()=false | 1/2:"],
+        ),
+    ],
+}
+"""For each rule of ``bbtc.ground.effects`` effects, and the factors that they come to."""
+
+
+@pytest.mark.parametrize(("effect", "factors"), [pair for pairs in RULES.values() for pair in pairs])
+def test_an_effect_is_rewritten(effect: str, factors: list[str]) -> None:
+    assert _act(effect) == factors
+
+
 def test_what_is_certain_joins_the_only_chance() -> None:
     assert _act("(and (not (p)) (probabilistic 0.2 (q) 0.8 (not (q))))") == [
         "1/5: p()=false q()=true | 4/5: p()=false q()=false"
