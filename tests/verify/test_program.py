@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bbtc.verifier.chain import chain_of
 from bbtc.verifier.program import (
     NO,
     YES,
@@ -16,6 +17,16 @@ from bbtc.verifier.program import (
     none_of,
     written_size,
 )
+from tests.strategies import soda_tree
+
+
+def test_a_small_tree_is_written_by_the_guards_of_its_leaves_a_large_one_by_its_walk() -> None:
+    tree = soda_tree()
+    guards, walk = (chain_of(tree.task, tree.root, form) for form in ("guards", "walk"))
+    assert guards != walk
+    assert chain_of(tree.task, tree.root) == guards
+    assert chain_of(tree.task, tree.root, most_written=written_size(guards)) == guards
+    assert chain_of(tree.task, tree.root, most_written=written_size(guards) - 1) == walk
 
 
 def test_the_written_size_is_that_of_the_text_with_all_formulas_unfolded() -> None:
