@@ -172,6 +172,11 @@ def test_the_table_grows() -> None:
     assert (table.number(first) == np.arange(5000)).all()
     assert (table.number(first[::-1]) == np.arange(5000)[::-1]).all()
     assert table.count == 5000
+    for multiplier in range(3, 103, 2):  # where they stand in the table differs
+        table, states = StateTable(1), np.arange(300, dtype=np.uint64).reshape(-1, 1) * np.uint64(multiplier)
+        for part in np.split(states, 10):
+            table.number(part)
+        assert (table.number(states) == np.arange(300)).all()
 
 
 def test_conditions_of_any_shape_become_cubes() -> None:
