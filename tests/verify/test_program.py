@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from fractions import Fraction
+
+from bbtc.backends.models.prism import prism
+from bbtc.ground.condition import TRUE, Is
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
 from bbtc.verifier.chain import chain_of
 from bbtc.verifier.program import (
     NO,
@@ -17,7 +24,10 @@ from bbtc.verifier.program import (
     none_of,
     written_size,
 )
+from tests.plan.test_refine import action, task
 from tests.strategies import soda_tree
+
+HALF = Fraction(1, 2)
 
 
 def test_a_small_tree_is_written_by_the_guards_of_its_leaves_a_large_one_by_its_walk() -> None:
@@ -37,6 +47,19 @@ def test_the_written_size_is_that_of_the_text_with_all_formulas_unfolded() -> No
     labels = (("all", AllOf((either, either))), ("one", a))
     program = Program("dtmc", "t", (), tuple(draft.formulas), (), labels)
     assert written_size(program) == (1 + 8 + 8) + 1
+
+
+def test_no_formula_is_written_that_nothing_reads() -> None:
+    """Here a part of the tree has conditions only: no action asks whether it is ticked."""
+    goal, T = Is(0, Truth.TRUE), Truth.TRUE
+    of = task("done ready", {1: T}, goal, action("act", TRUE, ("1/2", {0: T}), ("1/2", {})))
+    done = ControlNode("n2", "sequence", (ConditionNode("n3", goal), ConditionNode("n4", Is(1, T))))
+    acting = ControlNode("n5", "sequence", (ActionNode("n6", "act()"), ConditionNode("n7", goal)))
+    for tree in (Tree(of, ControlNode("n1", "fallback", (done, acting)), HALF, HALF, "stuck"), soda_tree()):
+        text = prism.export(tree, {"form": "guards"}, None)
+        names = re.findall(r"^formula (\S+) =", text, re.MULTILINE)
+        assert names
+        assert [name for name in names if len(re.findall(rf"\b{re.escape(name)}\b", text)) < 2] == []
 
 
 def test_what_says_nothing_is_not_written() -> None:
