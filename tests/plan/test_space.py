@@ -134,6 +134,13 @@ def test_many_states_at_once_and_many_actions() -> None:
     assert by_arrays(space) == by_simulator(space.task)
 
 
+def test_an_action_that_draws_nothing_changes_nothing() -> None:
+    wait = GroundAction("wait", (), TRUE, ())
+    of = lamps(4)
+    space = explore_space(dataclasses.replace(of, actions=(*of.actions, wait)), Limits())
+    assert by_arrays(space) == by_simulator(of) == by_simulator(space.task)
+
+
 def test_a_depth_leaves_the_rest_unexpanded() -> None:
     task = dataclasses.replace(lamps(70), goal=Is(0, Truth.FALSE))
     assert explore_space(task, Limits(), depth=1).levels == (0, 1)

@@ -55,7 +55,9 @@ def test_no_formula_is_written_that_nothing_reads() -> None:
     of = task("done ready", {1: T}, goal, action("act", TRUE, ("1/2", {0: T}), ("1/2", {})))
     done = ControlNode("n2", "sequence", (ConditionNode("n3", goal), ConditionNode("n4", Is(1, T))))
     acting = ControlNode("n5", "sequence", (ActionNode("n6", "act()"), ConditionNode("n7", goal)))
-    for tree in (Tree(of, ControlNode("n1", "fallback", (done, acting)), HALF, HALF, "stuck"), soda_tree()):
+    again = ControlNode("n8", "sequence", (ActionNode("n9", "act()"), ConditionNode("n10", goal)))
+    root = ControlNode("n1", "fallback", (acting, done, again))
+    for tree in (Tree(of, root, HALF, HALF, "stuck"), soda_tree()):
         text = prism.export(tree, {"form": "guards"}, None)
         names = re.findall(r"^formula (\S+) =", text, re.MULTILINE)
         assert names
