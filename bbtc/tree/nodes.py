@@ -81,7 +81,8 @@ class ActionNode:
 
 Node: TypeAlias = ControlNode | ConditionNode | ActionNode
 
-Status: TypeAlias = Literal["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
+PlanStatus: TypeAlias = Literal["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
+"""How planning ended. What a node returns at a tick is a :class:`bbtc.belief.tick.NodeStatus`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +97,7 @@ class Tree:
     root: Node
     success_probability: Fraction
     target: Fraction
-    status: Status
+    status: PlanStatus
     bounds: tuple[Fraction, Fraction] | None = None
 
     def _repr_svg_(self) -> str | None:
