@@ -9,7 +9,7 @@ from fractions import Fraction
 from bbtc.ground.task import Task
 from bbtc.verifier.program import YES, Branch, Cell, Command, Compare, Drafting, Expression, put
 
-_ZERO, _ONE = Fraction(0), Fraction(1)
+_ZERO = Fraction(0)
 
 
 @dataclass(frozen=True, slots=True)

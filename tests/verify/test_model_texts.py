@@ -155,3 +155,11 @@ def test_a_number_that_a_json_text_has_no_room_for_is_refused() -> None:
     assert "0.0" in prism.export(tree, {"form": "auto"}, None)
     with pytest.raises(BbtcError, match="BBT0113"):
         jani.export(tree, {"form": "auto"}, None)
+
+
+def test_what_is_certain_is_written_without_a_probability() -> None:
+    """As people write it, and on one line."""
+    commands = [line for line in prism_task(corridor(["a", "b", "c"])).splitlines() if "->" in line]
+    certain = [line for line in commands if line.endswith(";")]
+    assert len(certain) == len(commands) - 1, "but for the first step, which fails half the time"
+    assert not [line for line in certain if " : " in line.split("->")[1]]
