@@ -132,6 +132,9 @@ class BbtcError(Exception):
         self.diagnostics = tuple(diagnostics)
         super().__init__("\n".join(d.render() for d in self.diagnostics))
 
+    def __reduce__(self) -> tuple[type[BbtcError], tuple[tuple[Diagnostic, ...]]]:
+        return type(self), (self.diagnostics,)  # else a pickle would hold the text alone
+
     @classmethod
     def single(cls, code: str, message: str, span: Span | None = None, hint: str | None = None) -> BbtcError:
         """An error of one diagnostic."""

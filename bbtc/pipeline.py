@@ -18,7 +18,7 @@ from bbtc.planner.options import DEFAULTS, Options
 from bbtc.rounding import figure_text
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
-from bbtc.tree.nodes import Status, Tree
+from bbtc.tree.nodes import PlanStatus, Tree
 
 if TYPE_CHECKING:
     from bbtc.backends.btcpp.reader.xml import Imported
@@ -346,7 +346,7 @@ def _with_figures(imported: Imported, source: SourceFile, report: Report, limits
     if success == imported.claimed:
         return tree
     if success >= tree.target:
-        status: Status = "target-reached"
+        status: PlanStatus = "target-reached"
     else:
         status = "stuck" if tree.status == "target-reached" else tree.status
     return replace(tree, success_probability=success, status=status)

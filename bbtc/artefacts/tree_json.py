@@ -34,7 +34,7 @@ from bbtc.tree.nodes import (
     ControlKind,
     ControlNode,
     Node,
-    Status,
+    PlanStatus,
     Tree,
     actions_of,
 )
@@ -44,7 +44,7 @@ FORMAT = "bbtc-tree"
 VERSION = 1
 
 _CONTROLS: Mapping[str, ControlKind] = {kind: kind for kind in get_args(ControlKind)}
-_STATUSES: Mapping[str, Status] = {status: status for status in get_args(Status)}
+_STATUSES: Mapping[str, PlanStatus] = {status: status for status in get_args(PlanStatus)}
 _LABELS = ("name", "template", "reason")
 _BOUNDS = ("lower", "upper")
 

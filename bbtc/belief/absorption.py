@@ -26,7 +26,7 @@ class Absorption:
         for edges in chain.edges:
             row: dict[int, Fraction] = {}
             for edge in edges:
-                row[edge.target] = row.get(edge.target, _ZERO) + edge.result.probability
+                row[edge.successor] = row.get(edge.successor, _ZERO) + edge.result.probability
             self._rows.append(row)
         self._components = components([tuple(row) for row in self._rows])
         component_of = [0] * len(self._rows)

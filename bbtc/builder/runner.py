@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 _SAVE_EVERY = 1.0
 """Seconds between two savings of the state, which bound what a kill can lose."""
 
-Status: TypeAlias = Literal["unchanged", "built", "failed"]
+BuildStatus: TypeAlias = Literal["unchanged", "built", "failed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Outcome:
     figures, if it was built."""
 
     name: str
-    status: Status
+    status: BuildStatus
     changed: tuple[str, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
     failure: Failure | None = None
@@ -60,7 +60,7 @@ class BuildReport:
 
     outcomes: tuple[Outcome, ...]
 
-    def count(self, status: Status) -> int:
+    def count(self, status: BuildStatus) -> int:
         """How many trees had this outcome."""
         return sum(outcome.status == status for outcome in self.outcomes)
 

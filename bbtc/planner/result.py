@@ -24,7 +24,7 @@ class Refinement:
     ``condition`` was ``value`` in runs of total probability ``probability``; ``inserted`` names
     the action or template inserted, or whose branch was moved; once its preconditions hold,
     ``unmet`` of which did not hold yet, it makes the condition hold (known, if it was unknown) with
-    probability ``chance``, and unknown, so that it can be observed, with ``open``.
+    probability ``chance``, and unknown, so that it can be observed, with ``observable``.
     ``success`` is the tree's success probability afterwards. A retreat takes back the last
     ``taken_back`` refinements, which brought nothing, the first of them being the one it names.
     """
@@ -35,7 +35,7 @@ class Refinement:
     probability: Fraction
     inserted: str
     chance: Fraction = Fraction(0)
-    open: Fraction = Fraction(0)
+    observable: Fraction = Fraction(0)
     unmet: int = 0
     success: Fraction = Fraction(0)
     nodes: int = 0

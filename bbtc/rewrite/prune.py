@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bbtc.belief.chain import Chain
-from bbtc.belief.tick import Status, compile_tick
+from bbtc.belief.tick import NodeStatus, compile_tick
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ControlNode, Node, actions_of
@@ -23,7 +23,7 @@ def without_idle_branches(task: Task, root: Node, chain: Chain, limits: Limits) 
     active: set[str] = set()
 
     def observe(node: Node, status: int) -> None:
-        if status != Status.FAILURE:
+        if status != NodeStatus.FAILURE:
             active.add(node.id)
 
     tick = compile_tick(task, root, observe)

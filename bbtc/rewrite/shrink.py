@@ -10,7 +10,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.soundness import violations
 from bbtc.belief.state import Transition
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -65,14 +65,14 @@ class _Worth:
     @classmethod
     def of(cls, chain: Chain) -> _Worth:
         visits = Absorption(chain).visits()
-        ends = {status: Fraction(0) for status in Status}
+        ends = {status: Fraction(0) for status in NodeStatus}
         for state in chain.final:
             ends[chain.status[state]] += visits[state] or 0
         endless = 1 - sum(ends.values(), Fraction(0))
         cost = Fraction(0)
         for visit, edges in zip(visits, chain.edges, strict=True):
             cost += (visit or 0) * sum((e.result.probability * e.result.cost for e in edges), Fraction(0))
-        return cls(ends[Status.SUCCESS], endless, None if endless else cost)
+        return cls(ends[NodeStatus.SUCCESS], endless, None if endless else cost)
 
     def will_do(self, before: _Worth, target: Fraction) -> bool:
         """Is it good enough in place of what was before?"""

@@ -20,16 +20,16 @@ from dataclasses import replace
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.same_runs import same_runs
 from bbtc.belief.state import Transition
-from bbtc.belief.tick import Status, compile_tick
+from bbtc.belief.tick import NodeStatus, compile_tick
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
 
-GOES_ON: dict[ControlKind, Status] = {
-    "sequence": Status.SUCCESS,
-    "fallback": Status.FAILURE,
-    "skipper": Status.RUNNING,
+GOES_ON: dict[ControlKind, NodeStatus] = {
+    "sequence": NodeStatus.SUCCESS,
+    "fallback": NodeStatus.FAILURE,
+    "skipper": NodeStatus.RUNNING,
 }
 """After which status of a child a control node ticks the next one."""
 

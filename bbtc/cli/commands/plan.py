@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from bbtc.planner.options import Options, Retries
     from bbtc.planner.result import Plan, Refinement
     from bbtc.planner.why_not import DeadEnd
-    from bbtc.tree.nodes import Status
+    from bbtc.tree.nodes import PlanStatus
 
 _TELLING = 1.0
 """Seconds for finding out why a target is out of reach, which is told besides."""
 
-STATUS_EXIT: dict[Status, int] = {
+STATUS_EXIT: dict[PlanStatus, int] = {
     "target-reached": 0,
     "out-of-reach": EXIT_ERRORS,
     "stuck": EXIT_LIMIT,

@@ -31,7 +31,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import FailureFinder
 from bbtc.belief.state import Transition, Values, compile_action
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import evaluate
 from bbtc.ground.describe import describe
@@ -48,7 +48,7 @@ from bbtc.planner.mdp.maxprob import reachability
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement
 from bbtc.rewrite.simplify import size
-from bbtc.tree.nodes import Status as PlanStatus
+from bbtc.tree.nodes import PlanStatus
 
 MOST_TREES = 400
 """Trees simulated in one search."""
@@ -165,8 +165,8 @@ class _Search:
         absorption = Absorption(chain)
         visits = absorption.visits()
         ends = [(visits[state] or Fraction(0), state) for state in chain.final]
-        success = sum((p for p, state in ends if chain.status[state] is Status.SUCCESS), Fraction(0))
-        failing = [(p, state) for p, state in ends if p and chain.status[state] is not Status.SUCCESS]
+        success = sum((p for p, state in ends if chain.status[state] is NodeStatus.SUCCESS), Fraction(0))
+        failing = [(p, state) for p, state in ends if p and chain.status[state] is not NodeStatus.SUCCESS]
         endless = 1 - sum((p for p, _ in ends), Fraction(0))
         lost = sum((p for p, state in failing if not self.hopeful(chain.states[state].values)), Fraction(0))
         started = dict.fromkeys(chain.actions[chain.action[state]].id for state in sorted(absorption.endless))

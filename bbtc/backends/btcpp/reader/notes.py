@@ -20,10 +20,10 @@ from bbtc.backends.names import Kind, Symbol
 from bbtc.backends.shape import written
 from bbtc.ground.condition import TRUE
 from bbtc.ground.task import Task
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Status, Tree, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, PlanStatus, Tree, walk
 
 _KINDS: Mapping[str, Kind] = {"predicate": "predicate", "action": "action"}
-_STATUSES: Mapping[str, Status] = {status: status for status in get_args(Status)}
+_STATUSES: Mapping[str, PlanStatus] = {status: status for status in get_args(PlanStatus)}
 _NUMBERED_ID = re.compile(r"n([0-9]{1,9})")
 
 
@@ -35,7 +35,7 @@ class Notes:
     problem: str | None = None
     success_probability: Fraction | None = None
     target: Fraction | None = None
-    status: Status = "stuck"
+    status: PlanStatus = "stuck"
     bounds: tuple[Fraction, Fraction] | None = None
     names: FileNames = field(default_factory=lambda: FileNames("", {}, {}))
     kinds: tuple[str, ...] = ()
