@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from bbtc.artefacts.jsontext import escaped
 from bbtc.codes import CODES
 from bbtc.diagnostics import Diagnostic, Severity
-from bbtc.printable import printable_line
+from bbtc.printable import escaped, printable_line
 from bbtc.source import Span
 from bbtc.version import __version__
 

@@ -160,8 +160,9 @@ def run_planner(
 ) -> Plan:
     """Plan, telling the session each refinement as it is made and how planning ended. Afterwards neither a
     limit nor a signal keeps the tree from being written."""
+    from bbtc.artefacts.numbers import exact
     from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
-    from bbtc.cli.wording import exact, plan_summary, refinement_line, simplified_line
+    from bbtc.cli.wording import plan_summary, refinement_line, simplified_line
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
     from bbtc.planner.options import DEFAULTS
