@@ -82,7 +82,7 @@ _HOMES = MappingProxyType(
         "LimitReached": "diagnostics",
         "Limits": "limits",
         "Model": "model.domain",
-        "Plan": "plan.result",
+        "Plan": "planner.result",
         "Report": "diagnostics",
         "SourceFile": "source",
         "Task": "ground.task",

@@ -27,7 +27,7 @@ def hopeless(model: md.Model) -> Iterator[Diagnostic]:
             shown = "" if span is None else f" `{' '.join(span.text.split())[:_LONGEST]}`"
             message = f"nothing can make the goal{shown} true"
             hint = "`:init` does not give it, and no action that can apply brings it about"
-            yield Diagnostic("BBT0316", message, span, hint, Severity.WARNING)
+            yield Diagnostic("BBT0316", message, span, hint)
 
 
 def not_unknown(model: md.Model) -> Iterator[Diagnostic]:

@@ -31,7 +31,7 @@ from bbtc.manifest.find import manifest_bytes, source_name
 
 if TYPE_CHECKING:
     from bbtc.builder.job import Failure, Job, Made
-    from bbtc.manifest.read import Manifest, TreeEntry
+    from bbtc.manifest.entries import Manifest, TreeEntry
 
 _SAVE_EVERY = 1.0
 """Seconds between two savings of the state, which bound what a kill can lose."""

@@ -39,7 +39,7 @@ from bbtc.backends.btcpp.reader.unread import Unread, Unreadable, unreadable
 from bbtc.backends.btcpp.reader.xmltext import XmlElement, parse_xml
 from bbtc.backends.interface import guard_of
 from bbtc.backends.shape import words_of, written
-from bbtc.diagnostics import BbtcError, Diagnostic, Report, Severity
+from bbtc.diagnostics import BbtcError, Diagnostic, Report
 from bbtc.ground.condition import TRUE, And, Condition, Or
 from bbtc.ground.task import Task, ground_name
 from bbtc.limits import Limits
@@ -108,7 +108,7 @@ def tree_from_btcpp(
     notes = read_notes(document, namespace)
     if notes is None:
         message = "the notes at the end of the file cannot be read: ids and claims are made anew"
-        report.add(Diagnostic("BBT0617", message, document.span(document.root), None, Severity.WARNING))
+        report.add(Diagnostic("BBT0617", message, document.span(document.root)))
         notes = read_notes(replace(document, comments=()), namespace) or Notes()
     if notes.problem is not None and (notes.domain, notes.problem) != (task.domain, task.problem):
         about = clip(f"{notes.domain}/{notes.problem}")
@@ -198,12 +198,12 @@ class _Reader:
             listed = clip(", ".join(spare))
             place = self._document.span(self._layout.trees[spare[0]], "ID")
             message = f"not part of the tree, as '{clip(self._layout.main)}' does not call it: {listed}"
-            yield Diagnostic("BBT0618", message, place, "give --tree ID for another", Severity.NOTE)
+            yield Diagnostic("BBT0618", message, place, "give --tree ID for another")
         if self._flag is None:
             message = "where nothing can go on, the tree fails, but the file is RUNNING for ever"
             hint = "export the tree anew: its branch 'until blocked' is missing in the file"
             place = self._document.span(self._layout.trees[self._layout.main])
-            yield Diagnostic("BBT0620", message, place, hint, Severity.WARNING)
+            yield Diagnostic("BBT0620", message, place, hint)
 
     def place(self, root: Node, path: ChildPath) -> XmlElement:
         """The element that a node was read from."""
