@@ -11,7 +11,7 @@ from bbtc.exit_status import ExitStatus
 from bbtc.printable import printable, printable_line
 from bbtc.source import Span
 
-__all__ = ["BbtcError", "Diagnostic", "LimitReached", "Related", "Report", "Severity"]
+__all__ = ["BbtcError", "Diagnostic", "LimitReached", "Related", "Report", "Severity", "Unreadable"]
 
 _OF_CODE = cast("Severity", None)
 
@@ -147,6 +147,14 @@ class BbtcError(Exception):
     def exit_status(self) -> ExitStatus:
         """What a command ends with that this stops."""
         return exit_status(each.code for each in self.diagnostics)
+
+
+class Unreadable(Exception):
+    """A part of an input cannot be read. What reads the whole takes note of it, and reads on."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        self.diagnostic = diagnostic
+        super().__init__(diagnostic.message)
 
 
 class LimitReached(BbtcError):

@@ -23,6 +23,6 @@ def make_project(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
         raise BbtcError(
             Diagnostic("BBT1007", f"{path} is there already", hint="choose another folder") for path in taken
         )
-    template = files("bbtc") / "build" / "template"
+    template = files("bbtc.builder") / "template"
     write_files(str(root), {name: (template / name.lstrip(".")).read_text("utf-8") for name in NAMES})
     return paths

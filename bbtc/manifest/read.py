@@ -9,11 +9,11 @@ from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TypeVar, cast
 
-from bbtc.artefacts.cursor import At, Fault, Faults, Stop, clip, run_reader
+from bbtc.artefacts.cursor import At, Faults, Stop, clip, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.backends.exporter import Exporter
 from bbtc.backends.registry import load_exporter, parse_options
-from bbtc.diagnostics import BbtcError
+from bbtc.diagnostics import BbtcError, Unreadable
 from bbtc.manifest import modules
 from bbtc.manifest.entries import Export, Manifest, TreeEntry
 from bbtc.manifest.expectations import Expectation, parse_expectation
@@ -81,8 +81,8 @@ class _Reader:
         for name, entry in members["trees"].entries():
             try:
                 trees.append(self._tree(name, entry, defaults))
-            except Fault as fault:
-                self.faults.add(fault)
+            except Unreadable as fault:
+                self.faults.add(fault.diagnostic)
         for wrong in self.places.faults():
             self.faults.add(wrong)
         return Manifest(file, tuple(trees))
@@ -162,8 +162,8 @@ class _Reader:
         for name, each in named:
             try:
                 exports.append(self._export(name, each, tree, forms))
-            except Fault as fault:
-                self.faults.add(fault)
+            except Unreadable as fault:
+                self.faults.add(fault.diagnostic)
         places = dict(named)
         return tuple(self._with_module(places[export.name], export, exports) for export in exports)
 
@@ -173,7 +173,7 @@ class _Reader:
             return modules.with_module(export, exports) if export.form == modules.ROBOT else export
         except ValueError as error:
             hint = "name its file otherwise, or say `options: {module: …}`"
-            self.faults.add(at.fault("BBT0707", printable(str(error)), hint))
+            self.faults.add(at.found("BBT0707", printable(str(error)), hint))
             return export
 
     def _export(self, name: str, at: At, tree: str, forms: list[str]) -> Export:
@@ -231,7 +231,7 @@ class _Reader:
         """Defaults and aliases let a short text say very much."""
         self.left -= values
         if self.left < 0:
-            self.faults.add(at.fault("BBT0005", f"the trees have more than {MOST_VALUES} settings in all"))
+            self.faults.add(at.found("BBT0005", f"the trees have more than {MOST_VALUES} settings in all"))
             raise Stop
 
 

@@ -8,7 +8,7 @@ its place. What a tree cannot hold is reported with its place. The inverse of
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import islice
@@ -35,18 +35,18 @@ from bbtc.backends.btcpp.reader.patterns import (
     match,
     tag_of,
 )
-from bbtc.backends.btcpp.reader.unread import Unread, Unreadable, unreadable
+from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.reader.xmltext import XmlElement, parse_xml
 from bbtc.backends.interface import guard_of
 from bbtc.backends.shape import words_of, written
-from bbtc.diagnostics import BbtcError, Diagnostic, Report
+from bbtc.diagnostics import BbtcError, Diagnostic, Report, Unreadable
 from bbtc.ground.condition import TRUE, And, Condition, Or
 from bbtc.ground.task import Task, ground_name
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 from bbtc.tree.deep import Deep, unwind
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree, walk
-from bbtc.tree.validate import MAX_DEPTH, ChildPath, tree_problems
+from bbtc.tree.validate import MAX_DEPTH, tree_problems
 
 _MOST_FAULTS = 50
 _MOST_READ = 30  # elements of a file for each node that a tree may have
@@ -129,8 +129,8 @@ def tree_from_btcpp(
     tree = with_notes(tree, notes)
     limits.check_nodes(sum(1 for _ in walk(root)))
     problems = [
-        Diagnostic(p.code, p.message, document.span(reader.place(root, p.path)), p.hint)
-        for p in islice(tree_problems(tree), _MOST_FAULTS)
+        replace(each, span=document.span(reader.place(root, each.path)), path=())
+        for each in islice(tree_problems(tree), _MOST_FAULTS)
     ]
     if problems:
         raise BbtcError(problems)
@@ -205,11 +205,12 @@ class _Reader:
             place = self._document.span(self._layout.trees[self._layout.main])
             yield Diagnostic("BBT0620", message, place, hint)
 
-    def place(self, root: Node, path: ChildPath) -> XmlElement:
+    def place(self, root: Node, path: Sequence[str | int]) -> XmlElement:
         """The element that a node was read from."""
         node = root
         for number in path:
             assert isinstance(node, ControlNode)
+            assert isinstance(number, int)
             node = node.children[number]
         return self.places[id(node)]
 
