@@ -146,7 +146,8 @@ class BbtcError(Exception):
     @property
     def exit_status(self) -> ExitStatus:
         """What a command ends with that this stops."""
-        return exit_status(each.code for each in self.diagnostics)
+        errors = [each.code for each in self.diagnostics if each.severity is Severity.ERROR]
+        return exit_status(errors) or ExitStatus.ERRORS
 
 
 class Unreadable(Exception):
