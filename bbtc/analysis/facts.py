@@ -176,7 +176,7 @@ class Known:
     @cached_property
     def relevant(self) -> set[str]:
         """The actions that can matter to the goal."""
-        return relevant(self.model)[1]
+        return relevant(self.model)
 
 
 def reached(model: md.Model) -> Reached:
@@ -284,8 +284,9 @@ def _apply(effect: me.Effect, result: Reached) -> None:
             assert_never(effect)
 
 
-def relevant(model: md.Model) -> tuple[set[str], set[str]]:
-    """Predicates and actions that can matter to the goal, to a reward metric or to a template."""
+def relevant(model: md.Model) -> set[str]:
+    """The actions that can matter to the goal, to a reward metric or to a template, as predicates tell.
+    Grounding knows atoms, and finds more (:mod:`bbtc.ground.relevance`, :mod:`bbtc.ground.prune`)."""
     predicates: set[str] = set()
     actions: set[str] = set()
     todo: list[str] = []
@@ -319,7 +320,7 @@ def relevant(model: md.Model) -> tuple[set[str], set[str]]:
         read([rule.condition for rule in rules.get(predicate, ())])
         for name in setters.get(predicate, ()):
             act(name)
-    return predicates, actions
+    return actions
 
 
 def _setters(model: md.Model) -> tuple[dict[str, list[str]], dict[str, list[md.Rule]]]:
