@@ -21,23 +21,6 @@ from bbtc.printable import printable
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree, retries_of, walk
 
-__all__ = [
-    "at",
-    "block_line",
-    "changes",
-    "counted",
-    "exact",
-    "failing_lines",
-    "figures_report",
-    "oneof_note",
-    "plan_summary",
-    "refinement_line",
-    "run_lines",
-    "simplified_line",
-    "steps_of",
-    "within",
-]
-
 _MOST_NAMED = 5  # actions named of many
 _MOST_BLOCKS = 3  # causes told of one run
 _MOST_STEPS = 12  # actions told of one run

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
 from bbtc.belief.chain import Chain
 from bbtc.belief.simulate import Figures
 from bbtc.diagnostics import Diagnostic
-from bbtc.ground.task import Task
 from bbtc.kleene import Truth
-from bbtc.limits import Limits
-from bbtc.planner.options import Options
 from bbtc.tree.nodes import Tree
 
 
@@ -60,13 +57,3 @@ class Plan:
     def _repr_svg_(self) -> str | None:
         """The picture of the tree, for notebooks."""
         return self.tree._repr_svg_()
-
-
-class Strategy(Protocol):
-    """A planner: from a ground task and a target probability to a plan. Always returns."""
-
-    def __call__(
-        self, task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = ...
-    ) -> Plan:
-        """Plan. ``progress`` is told every refinement as it is made."""
-        ...

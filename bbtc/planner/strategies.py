@@ -5,12 +5,24 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 from importlib import import_module
+from typing import Protocol
 
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.options import Options
-from bbtc.planner.result import Plan, Progress, Strategy
+from bbtc.planner.result import Plan, Progress
+
+
+class Strategy(Protocol):
+    """A planner: from a ground task and a target probability to a plan. Always returns."""
+
+    def __call__(
+        self, task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = ...
+    ) -> Plan:
+        """Plan. ``progress`` is told every refinement as it is made."""
+        ...
+
 
 STRATEGIES = {
     "refine": ("bbtc.planner.chaining.refine", "refine"),

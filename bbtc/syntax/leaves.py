@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
+from bbtc.diagnostics import Diagnostic, Related, Unreadable
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
 from bbtc.syntax.ast import (
@@ -64,14 +65,14 @@ _EXPONENT = re.compile(r"e[-+]?0*([0-9]+)$", re.IGNORECASE)
 _ZERO_DENOMINATOR = re.compile(r"/0+$")
 
 
-class Misuse(Exception):
+class Misuse(Unreadable):
     """A form that fits the grammar's rules one by one but not together; reported like a syntax error."""
 
     def __init__(
         self, code: str, message: str, span: Span, hint: str | None = None, first: Span | None = None
     ) -> None:
-        super().__init__(message)
-        self.code, self.message, self.span, self.hint, self.first = code, message, span, hint, first
+        related = (Related("first given here", first),) if first else ()
+        super().__init__(Diagnostic(code, message, span, hint, related=related))
 
 
 def name(token: Token) -> Name:

@@ -48,7 +48,7 @@ def test_latched_actions_that_never_end_are_told() -> None:
     chain = pressed()
     (first,) = (index for index, action in enumerate(chain.action) if action >= 0)
     result = replace_probability(chain.edges[first][0], Fraction(1))
-    bent = replace(chain, edges=tuple((result._replace(target=first),) if i == first else e
+    bent = replace(chain, edges=tuple((result._replace(successor=first),) if i == first else e
                                       for i, e in enumerate(chain.edges)))  # fmt: skip
     assert violations(light(), bent) == ["a tree of latched actions never ends"]
 

@@ -85,8 +85,9 @@ def command(
 
 
 def _scenario_lines(tree: Tree, listed: list[Scenario]) -> list[str]:
+    from bbtc.artefacts.numbers import exact
     from bbtc.belief.tick import NodeStatus
-    from bbtc.cli.wording import exact, run_lines
+    from bbtc.cli.wording import run_lines
 
     lines = []
     for number, run in enumerate(listed, 1):
