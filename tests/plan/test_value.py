@@ -15,9 +15,9 @@ from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.markov import solve
 from bbtc.planner.mdp import maxprob as value_module
 from bbtc.planner.mdp.bounded_search import search_bounds
-from bbtc.planner.mdp.exact import solve
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
 from bbtc.planner.mdp.maxprob import Reachability, best_probability, reachability

@@ -19,7 +19,7 @@ import numpy as np
 
 from bbtc.diagnostics import LimitReached
 from bbtc.limits import Limits
-from bbtc.planner.mdp.exact import solve
+from bbtc.markov import Row, solve
 from bbtc.planner.mdp.explore import StateSpace
 from bbtc.planner.mdp.graph import Floats, Graph, Number, sums
 from bbtc.planner.mdp.packing import Flags
@@ -30,6 +30,7 @@ _UNIT = 2.0**-53
 _TIE = 1e-9  # floats closer than this may be equal
 _CLOSE = 1e-12  # bounds this close are not worth further sweeps
 _MOST_EXACT = 300_000  # edges of a system that is solved in rationals
+_MOST_WORK = 400_000  # elimination steps of one loop of states
 _CHECK_EVERY = 16  # sweeps between two looks at the bounds
 
 
@@ -225,7 +226,7 @@ class _Part:
                     if count % 1024 == 0:
                         limits.check_time("the exact solution")
                     rows.append(self.row(choice))
-                values = solve([row for _, row in rows], [win for win, _ in rows], limits)
+                values = solved(rows, limits)
                 if values is None:
                     return None
                 if not self._improve(policy, values, limits):
@@ -308,6 +309,13 @@ def best_probability(space: StateSpace, limits: Limits) -> Bounds:
     if space.complete:
         return low
     return Bounds(low.lower, reachability(space, limits, space.goal | space.open).initial.upper)
+
+
+def solved(system: list[tuple[Fraction, Row]], limits: Limits) -> list[Fraction] | None:
+    """The exact values of a chain, of which each state has a constant and a row; None if that is too much
+    work. Raises ``LimitReached`` when the time is over."""
+    rows, constant = [row for _, row in system], [own for own, _ in system]
+    return solve(rows, constant, most_work=_MOST_WORK, look=lambda: limits.check_time("the exact solution"))
 
 
 def _time_is_over(limits: Limits) -> bool:

@@ -15,9 +15,8 @@ from fractions import Fraction
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.exact import solve
 from bbtc.planner.mdp.graph import Floats, Number, sums
-from bbtc.planner.mdp.maxprob import Reachability, draw_probabilities
+from bbtc.planner.mdp.maxprob import Reachability, draw_probabilities, solved
 from bbtc.planner.mdp.packing import Flags
 from bbtc.rounding import rounded
 
@@ -148,7 +147,7 @@ class _System:
         while True:
             limits.check_time("the search for the least cost")
             rows = [self.row(int(choice)) for choice in policy[self.states]]
-            values = solve([row for _, row in rows], [cost for cost, _ in rows], limits)
+            values = solved(rows, limits)
             if values is None:
                 return None
             floats = np.zeros(self.graph.states)
