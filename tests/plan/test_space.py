@@ -16,7 +16,8 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp import packing as space_packing
 from bbtc.planner.mdp import transitions as space_actions
-from bbtc.planner.mdp.explore import StateSpace, explore_space
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.planner.mdp.state_table import StateTable
 from tests.strategies import tasks
 
@@ -55,10 +56,11 @@ def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
     for state, before in enumerate(values):
         assert before not in found, "a state stands twice"
         found[before] = {}
-        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
-            for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
-                draw = space.draws[space.edge_draw[edge]]
-                key = (space.action_name(choice), values[space.edge_target[edge]], draw.cost, draw.reward)
+        for choice in space.choices_of(np.array([state])).tolist():
+            name = space.task.actions[int(space.choice_action[choice])].name
+            for target, number in space.outcomes(choice):
+                draw = space.draws[number]
+                key = (name, values[target], draw.cost, draw.reward)
                 found[before][key] = found[before].get(key, Fraction(0)) + draw.probability
     return found
 

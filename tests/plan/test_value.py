@@ -6,6 +6,7 @@ import itertools
 import time
 from fractions import Fraction
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, assume, given, settings
 
@@ -20,8 +21,9 @@ from bbtc.planner.mdp import maxprob as value_module
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
-from bbtc.planner.mdp.maxprob import Reachability, best_probability, reachability
+from bbtc.planner.mdp.maxprob import Bounds, Reachability, reachability
 from bbtc.planner.mdp.ssp import least_cost
+from bbtc.planner.mdp.state_space import StateSpace
 from tests.plan.examples import Optimum, cases, corpus_optima
 from tests.plan.test_refine import action, task
 from tests.plan.test_space import by_simulator
@@ -117,11 +119,10 @@ def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task)
     wins: list[Fraction] = []
     for state in range(graph.states):
         rows: dict[int, dict[int, Fraction]] = {}
-        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
+        for choice in space.choices_of(np.array([state])).tolist():
             row = rows.setdefault(choice, {})
-            for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
-                p = space.draws[space.edge_draw[edge]].probability
-                target = int(space.edge_target[edge])
+            for target, draw in space.outcomes(choice):
+                p = space.draws[draw].probability
                 row[target] = row.get(target, Fraction(0)) + p
             expected = sum(p * values[t] for t, p in row.items())
             assert expected <= values[state]
@@ -174,6 +175,14 @@ def test_bounds_from_floats_hold_the_exact_values(of: Task, monkeypatch: pytest.
             assert b.lower <= a.lower <= b.upper
 
 
+def best_probability(space: StateSpace, limits: Limits) -> Bounds:
+    """P* of the task; bounds where the space is incomplete."""
+    low = reachability(space, limits).initial
+    if space.complete:
+        return low
+    return Bounds(low.lower, reachability(space, limits, space.goal | space.fringe).initial.upper)
+
+
 @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 @given(of=tasks())
 def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
@@ -202,10 +211,9 @@ def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
 
     def row(choice: int) -> tuple[Fraction, dict[int, Fraction]]:
         cost, chances = Fraction(0), dict[int, Fraction]()
-        for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
-            draw = space.draws[space.edge_draw[edge]]
+        for target, drawn in space.outcomes(choice):
+            draw = space.draws[drawn]
             cost += draw.probability * draw.cost
-            target = int(space.edge_target[edge])
             if target in number:
                 chances[number[target]] = chances.get(number[target], Fraction(0)) + draw.probability
         return cost, chances
@@ -215,7 +223,7 @@ def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
     assert attained is not None
     for state, value in zip(open_states, attained, strict=True):
         assert cheapest.best[cheapest.policy[state]]
-        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
+        for choice in space.choices_of(np.array([state])).tolist():
             if found.best[choice]:
                 cost, chances = row(choice)
                 total = cost + sum(p * attained[t] for t, p in chances.items())

@@ -192,11 +192,6 @@ class _Plan:
                 case _:
                     pass
 
-    def harms(self, condition: Condition) -> bool:
-        """Does it set something that makes the condition false?"""
-        against = set(_literals(negation(condition)))
-        return not against.isdisjoint(self.sets)
-
     def trouble_before(self, other: _Plan) -> int:
         """How bad is it to carry this plan out before the other? 3: the other makes this condition false
         again; 2: this takes what the other builds on, which only comes back at the expense of this

@@ -2,11 +2,11 @@
 
 Bounded search with a whole batch of states at a time, in the spirit of LAO* (Hansen and Zilberstein
 2001) and bounded real-time dynamic programming (Brázdil et al. 2014). The part of the space that was
-expanded is solved twice: with the open states lost, which gives a lower bound and a policy that
+expanded is solved twice: with the fringe states lost, which gives a lower bound and a policy that
 attains it, and with those won that are not dead ends for sure, which gives an upper bound. End
 components are merged by the solver, so both are sound and close whatever loops there are.
 
-1. Solve. 2. Stop when the bounds have met. 3. Find the open states that runs of the optimistic policy
+1. Solve. 2. Stop when the bounds have met. 3. Find the fringe states that runs of the optimistic policy
 end in; among the choices that are equally good by the bounds it prefers what is solved, then the way
 to the goal that the heuristic thinks short. 4. Expand them, the most probable first, and from there
 greedily after the heuristic, a share of what was expanded before; repeat.
@@ -22,11 +22,12 @@ import numpy as np
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.planner.mdp.explore import Choices, Explorer, StateSpace, ranges
-from bbtc.planner.mdp.graph import Floats, Graph, Number, sums
+from bbtc.planner.mdp.explore import Choices, Explorer
+from bbtc.planner.mdp.graph import Floats, Graph, sums
 from bbtc.planner.mdp.h_add import Costs, Heuristic
 from bbtc.planner.mdp.maxprob import Bounds, Reachability, draw_probabilities, reachability
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
 
 _CLOSED = 1e-9  # bounds this close have met
@@ -91,7 +92,7 @@ class _Search:
         solved = self._solve()
         stop: Diagnostic | None = None
         try:
-            while not self._done(solved.bounds) and solved.space.open.any():
+            while not self._done(solved.bounds) and solved.space.fringe.any():
                 frontier, mass = self._frontier(solved)
                 if not len(frontier):
                     break  # the optimistic policy is a policy, and the bounds met but for rounding
@@ -114,7 +115,7 @@ class _Search:
         space = self.explorer.space(~self.closed, (), None)
         graph = Graph(space)
         lower = reachability(space, self.limits, graph=graph, rationals=False)
-        hope = space.goal | space.open
+        hope = space.goal | space.fringe
         upper = reachability(space, self.limits, hope, graph=graph, rationals=False)
         solved = _Solved(space, graph, lower, upper)
         bounds = solved.bounds
@@ -137,7 +138,7 @@ class _Search:
             low = max(bounds.lower, lower.initial.lower)
             bounds = Bounds(low, max(low, bounds.upper))
             if bounds.exact is None and bounds.upper - low <= _CLOSED:
-                hope = solved.space.goal | solved.space.open
+                hope = solved.space.goal | solved.space.fringe
                 upper = reachability(solved.space, self.limits, hope, graph=solved.graph).initial.upper
                 bounds = Bounds(low, max(low, min(bounds.upper, upper)))
         except LimitReached:
@@ -147,7 +148,7 @@ class _Search:
     # --- what to expand --------------------------------------------------------------------------
 
     def _frontier(self, solved: _Solved) -> tuple[Index, Floats]:
-        """The open states that runs of the optimistic policy end in, the most probable first, and
+        """The fringe states that runs of the optimistic policy end in, the most probable first, and
         how probable they are."""
         space, graph, lower, upper = solved.space, solved.graph, solved.lower, solved.upper
         allowed = upper.best.copy()
@@ -155,15 +156,15 @@ class _Search:
         allowed[met[graph.choice_state]] = False
         own = lower.policy[met]
         allowed[own[own >= 0]] = True
-        ahead = np.where(space.open, np.minimum(self.guess, _FAR), 0).astype(np.int32)
-        via = graph.reach(space.goal | space.open, allowed, ahead).via
+        ahead = np.where(space.fringe, np.minimum(self.guess, _FAR), 0).astype(np.int32)
+        via = graph.reach(space.goal | space.fringe, allowed, ahead).via
         states, mass = _followed(space, via)
-        found = np.flatnonzero(space.open[states])
+        found = np.flatnonzero(space.fringe[states])
         found = found[np.argsort(-mass[found], kind="stable")]
         return states[found], mass[found]
 
     def _plunge(self, frontier: Index, mass: Floats) -> None:
-        """Expand open states, and from each follow the choice that the heuristic prefers."""
+        """Expand fringe states, and from each follow the choice that the heuristic prefers."""
         budget = max(_SMALLEST, self.expanded // _SHARE)
         least = self.expanded + (self.expanded // _LEAST_SHARE if self._solved_often() else 0)
         share = max(1, _SMALLEST // 4, budget // 2)
@@ -195,7 +196,7 @@ class _Search:
         return done
 
     def _next(self, found: Choices, states: Index, weights: Floats) -> tuple[Index, Floats]:
-        """The open states that the preferred choices lead to, and how probable they are."""
+        """The fringe states that the preferred choices lead to, and how probable they are."""
         if not len(found.owner):
             return np.empty(0, dtype=np.int64), np.empty(0)
         draws = self.explorer.tables.draws
@@ -231,25 +232,15 @@ class _Search:
 def _followed(space: StateSpace, via: Number) -> tuple[Index, Floats]:
     """The states that runs visit which take the choices of ``via``, and the probability of being
     there after some steps (of having ended there, where a state has no choice)."""
+    taken = np.zeros(len(space.choice_state), dtype=np.bool_)
+    taken[via[via >= 0]] = True
+    states = space.closure(space.start, taken)
+    count = len(states)
     number = np.full(len(space.states), -1, dtype=np.int64)
-    found: list[Index] = []
-    frontier: Index = np.unique([state for _, state in space.initial]).astype(np.int64)
-    count = 0
-    while len(frontier):
-        number[frontier] = count + np.arange(len(frontier))
-        count += len(frontier)
-        found.append(frontier)
-        choices = via[frontier]
-        choices = choices[choices >= 0]
-        edges = ranges(space.edge_first[choices], space.edge_first[choices + 1] - space.edge_first[choices])
-        targets = np.unique(space.edge_target[edges]).astype(np.int64)
-        frontier = targets[number[targets] < 0]
-    states = np.concatenate(found)
+    number[states] = np.arange(count)
     moving = np.flatnonzero(via[states] >= 0)
-    choices = via[states[moving]]
-    counts = space.edge_first[choices + 1] - space.edge_first[choices]
-    edges = ranges(space.edge_first[choices], counts)
-    source = np.repeat(moving, counts)
+    edges = space.edges_of(via[states[moving]])
+    source = number[space.choice_state[space.edge_choice[edges]]]
     target = number[space.edge_target[edges]]
     weight = draw_probabilities(space)[edges]
     mass = np.zeros(count)

@@ -8,10 +8,10 @@ from fractions import Fraction
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.explore import StateSpace
 from bbtc.planner.mdp.graph import Floats, Graph, sums
 from bbtc.planner.mdp.maxprob import Bounds, draw_probabilities
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.rounding import rounded
 
 _MOST_EXACT = 400_000  # edges times steps that are summed in rationals
@@ -62,26 +62,18 @@ def horizon_values(space: StateSpace, steps: int, limits: Limits, goal: Flags | 
 
 def _exact(space: StateSpace, steps: int, limits: Limits, aims: Flags) -> Horizon:
     table = [draw.probability for draw in space.draws]
-    targets = space.edge_target.tolist()
-    probabilities = [table[draw] for draw in space.edge_draw.tolist()]
-    choices = space.choice_first.tolist()
-    edges = space.edge_first.tolist()
+    choices = [
+        (state, [(table[draw], target) for target, draw in space.outcomes(choice)])
+        for choice, state in enumerate(space.choice_state.tolist())
+    ]
     values = [_ONE if goal else _ZERO for goal in aims.tolist()]
     found = [values]
     for _ in range(steps):
         limits.check_time("backward induction")
         after = list(values)
-        for state in range(len(values)):
-            for choice in range(choices[state], choices[state + 1]):
-                value = sum(
-                    (
-                        probabilities[e] * values[targets[e]]
-                        for e in range(edges[choice], edges[choice + 1])
-                        if values[targets[e]]
-                    ),
-                    _ZERO,
-                )
-                after[state] = max(after[state], value)
+        for state, outcomes in choices:
+            value = sum((p * values[target] for p, target in outcomes if values[target]), _ZERO)
+            after[state] = max(after[state], value)
         values = after
         found.append(values)
     initial = tuple(
@@ -98,10 +90,9 @@ def best_choices(horizon: Horizon, graph: Graph, step: int) -> Flags:
         flags = np.zeros(graph.choices, dtype=np.bool_)
         for choice in range(graph.choices):
             value = _ZERO
-            for edge in range(int(space.edge_first[choice]), int(space.edge_first[choice + 1])):
-                part = before[int(space.edge_target[edge])]
-                if part:
-                    value += space.draws[int(space.edge_draw[edge])].probability * part
+            for target, draw in space.outcomes(choice):
+                if before[target]:
+                    value += space.draws[draw].probability * before[target]
             flags[choice] = value == after[int(graph.choice_state[choice])]
         return flags
     floats = np.asarray(horizon.values[step - 1])

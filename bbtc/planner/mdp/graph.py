@@ -13,13 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc.markov import components
-from bbtc.planner.mdp.explore import StateSpace, ranges
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number, StateSpace, ranges
 from bbtc.planner.mdp.transitions import Index
 
 Floats = npt.NDArray[np.float64]
-Number = npt.NDArray[np.int32]
-"""Numbers of states or choices."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +42,8 @@ class Graph:
         self.space = space
         self.states = len(space.states)
         self.choices = len(space.choice_action)
-        counts = np.diff(space.choice_first)
-        self.choice_state: Number = np.repeat(np.arange(self.states, dtype=np.int32), counts)
-        """The state of each choice."""
-        self.edge_choice: Number = np.repeat(
-            np.arange(self.choices, dtype=np.int32), np.diff(space.edge_first)
-        )
-        """The choice of each edge."""
+        self.choice_state = space.choice_state
+        self.edge_choice = space.edge_choice
         order = np.argsort(space.edge_target, kind="stable")
         self._into: Number = self.edge_choice[order]
         counts = np.bincount(space.edge_target, minlength=self.states)
@@ -118,8 +111,7 @@ class Graph:
         staying = staying.copy()
         while True:
             # Drop choices that may lead where there is no such choice, until none is left.
-            has = np.zeros(self.states, dtype=np.bool_)
-            has[self.choice_state[staying]] = True
+            has = self.space.having(staying)
             dropped = staying & self.into(~has)
             if dropped.any():
                 staying &= ~dropped

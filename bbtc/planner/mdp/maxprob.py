@@ -20,9 +20,9 @@ import numpy as np
 from bbtc.diagnostics import LimitReached
 from bbtc.limits import Limits
 from bbtc.markov import Row, solve
-from bbtc.planner.mdp.explore import StateSpace
-from bbtc.planner.mdp.graph import Floats, Graph, Number, sums
+from bbtc.planner.mdp.graph import Floats, Graph, sums
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -203,9 +203,8 @@ class _Part:
         space = self.graph.space
         win = _ZERO
         row: dict[int, Fraction] = {}
-        for edge in range(int(space.edge_first[choice]), int(space.edge_first[choice + 1])):
-            target = int(space.edge_target[edge])
-            p = space.draws[int(space.edge_draw[edge])].probability
+        for target, draw in space.outcomes(choice):
+            p = space.draws[draw].probability
             number = int(self.number[target])
             if number >= 0:
                 row[number] = row.get(number, _ZERO) + p
@@ -300,15 +299,6 @@ def _iterate(part: _Part, limits: Limits) -> tuple[Floats, Floats]:
             break
     upper: Floats = np.minimum(high + sweeps * part.degree * _UNIT, 1.0)
     return lower, upper
-
-
-def best_probability(space: StateSpace, limits: Limits) -> Bounds:
-    """P* of the task; bounds where the space is incomplete. Raises ``LimitReached`` as
-    :func:`reachability` does."""
-    low = reachability(space, limits).initial
-    if space.complete:
-        return low
-    return Bounds(low.lower, reachability(space, limits, space.goal | space.open).initial.upper)
 
 
 def solved(system: list[tuple[Fraction, Row]], limits: Limits) -> list[Fraction] | None:

@@ -20,7 +20,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.transitions import Index
-from bbtc.planner.synthesis.permissive import Offers
+from bbtc.planner.synthesis.permissive import MultiPolicy
 from bbtc.planner.synthesis.rules import Learner, Literal, Rule, Test
 from bbtc.rewrite.simplify import numbered
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
@@ -30,35 +30,35 @@ _MOST_LOOKS = 5_000
 tried, and what is left and right of it and in it, which takes exponential time where little is shared."""
 
 
-def synthesize(task: Task, offers: Offers, limits: Limits) -> Node:
-    """A tree that takes one of the offers in every state a run visits, and otherwise fails.
+def synthesize(task: Task, policy: MultiPolicy, limits: Limits) -> Node:
+    """A tree that takes one of the policy's choices in every state a run visits, and otherwise fails.
     Raises ``LimitReached`` when the time is over."""
-    return numbered(_tree(task, offers, limits, fall_through=False))
+    return numbered(_tree(task, policy, limits, fall_through=False))
 
 
-def in_phases(task: Task, phases: Sequence[tuple[int, Offers]], limits: Limits) -> Node:
-    """Trees for offers that follow one another, each after so many actions of the one before.
+def in_phases(task: Task, phases: Sequence[tuple[int, MultiPolicy]], limits: Limits) -> Node:
+    """Trees for multi-policies that follow one another, each after so many actions of the one before.
     Raises ``LimitReached`` when the time is over."""
     parts: list[Node] = []
-    for number, (steps, offers) in enumerate(phases, 1):
-        tree = _tree(task, offers, limits, fall_through=number < len(phases))
+    for number, (steps, policy) in enumerate(phases, 1):
+        tree = _tree(task, policy, limits, fall_through=number < len(phases))
         parts.append(ControlNode("", "retry", (tree,), attempts=steps))
     return numbered(_control("fallback", parts) if parts else ConditionNode("", task.goal))
 
 
-def _tree(task: Task, offers: Offers, limits: Limits, *, fall_through: bool) -> Node:
+def _tree(task: Task, policy: MultiPolicy, limits: Limits, *, fall_through: bool) -> Node:
     """``fall_through``: fail where the goal is unknown and nothing is done about it, so that what
     follows gets its turn."""
-    goal = _truths(task.goal, offers.values)
+    goal = _truths(task.goal, policy.values)
     unknown: Flags = goal == Truth.UNKNOWN
     false: Flags = goal == Truth.FALSE
     nowhere = np.zeros_like(unknown)
-    learner = Learner(task, offers, limits)
-    ending = np.diff(offers.first) == 0
+    learner = Learner(task, policy, limits)
+    ending = ~policy.having()
     watching = learner.learn(unknown, nowhere)
     acting = learner.learn(false, unknown & ending)
-    node = _goal_node(task, offers.values[learner.relevant()])
-    build = _Builder(task, offers.values, limits)
+    node = _goal_node(task, policy.values[learner.relevant()])
+    build = _Builder(task, policy.values, limits)
     if watching:
         node = _control("skipper", [node, build.choice(build.rules(watching))])
     elif fall_through and (unknown & learner.relevant()).any():
