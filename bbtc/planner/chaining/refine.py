@@ -32,7 +32,7 @@ from bbtc.planner.chaining.flaws import Simulated, TargetFinder
 from bbtc.planner.chaining.threats import find_threat
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement
-from bbtc.rewrite.prune import without_idle_branches
+from bbtc.rewrite.simplify import without_idle_branches
 from bbtc.tree.nodes import Status as PlanStatus
 from bbtc.tree.nodes import walk
 
