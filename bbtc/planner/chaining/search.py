@@ -41,9 +41,9 @@ from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.chaining.draft import Attempt, Draft, Frozen, Subgoal, freeze, new_attempt
 from bbtc.planner.chaining.moves import Insertion, Move, Moves, forward, separating
-from bbtc.planner.chaining.relaxed import possible
 from bbtc.planner.finish import GRACE, finish
 from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.h_add import possible
 from bbtc.planner.mdp.maxprob import reachability
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement

@@ -24,7 +24,7 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.mdp.explore import Choices, Explorer
 from bbtc.planner.mdp.graph import Floats, Graph, sums
-from bbtc.planner.mdp.h_add import Costs, Heuristic
+from bbtc.planner.mdp.h_add import Costs, Relaxation
 from bbtc.planner.mdp.maxprob import Bounds, Reachability, draw_probabilities, reachability
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.state_space import Number, StateSpace
@@ -79,7 +79,7 @@ class _Search:
     def __init__(self, task: Task, limits: Limits, target: Fraction | None) -> None:
         self.limits, self.target = limits, target
         self.explorer = Explorer(task, limits)
-        self.heuristic = Heuristic(task, self.explorer.packing)
+        self.heuristic = Relaxation(task, limits, count_actions=True)
         self.probability = np.empty(0)
         self.guess: Costs = np.empty(0, dtype=np.float32)
         self.closed: Flags = np.empty(0, dtype=np.bool_)
@@ -224,7 +224,7 @@ class _Search:
         known, count = len(self.guess), self.explorer.count
         if known == count:
             return
-        guess = self.heuristic.estimate(self.explorer.table.states[known:count])
+        guess = self.heuristic.estimate(self.explorer.packing, self.explorer.table.states[known:count])
         self.guess = np.concatenate([self.guess, guess])
         self.closed = np.concatenate([self.closed, np.isinf(guess)]) | self.explorer.goal()
 
