@@ -16,7 +16,7 @@ from bbtc.planner.mdp import bounded_search as heuristic_search
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.h_add import Facts, Relaxation, operators_of
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.solve import best_known
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases, public
@@ -41,7 +41,7 @@ def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> None:
-    known = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
     found = search_bounds(of, Limits())
     assert found.stop is None
@@ -54,7 +54,7 @@ def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> N
 @settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
-    known = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
     for states in (1, 3, 6):
         found = search_bounds(of, Limits(states=states))
@@ -70,7 +70,7 @@ def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
 def test_what_the_heuristic_calls_a_dead_end_is_one(of: Task) -> None:
     space = explore_space(of, Limits())
     guess = Relaxation(of, Limits(), count_actions=True).estimate(space.packing, space.states)
-    hopeless = reachability(space, Limits()).zero
+    hopeless = max_prob(space, Limits()).prob_0
     assert not (guess == float("inf"))[~hopeless].any()
     assert ((guess == 0) | ~space.goal).all()
 

@@ -82,7 +82,7 @@ class Chooser:
         self.task = task
         self.transitions = transitions
         self.limits = limits
-        self.reachability = Relaxation(task, limits)
+        self.relaxation = Relaxation(task, limits)
         self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
         self._helps: dict[tuple[Subgoal, int, Truth, Values, frozenset[str]], bool] = {}
@@ -157,7 +157,7 @@ class Chooser:
         return tuple(c for c in conditions if changed.isdisjoint(variables(c)))
 
     def _applicable(self, conditions: tuple[Condition, ...], state: State) -> bool:
-        facts = self.reachability.facts(state.values)
+        facts = self.relaxation.facts(state.values)
         return all(possible(condition, facts) for condition in conditions)
 
     def _chances(
@@ -177,7 +177,7 @@ class Chooser:
             values = bytearray(state.values)
             for variable, value in forced.items():
                 values[variable] = value
-            may_hold = possible(goal, self.reachability.facts(state.values))
+            may_hold = possible(goal, self.relaxation.facts(state.values))
             for result in transition(bytes(values)):
                 after = evaluate(goal, result.values)
                 if after is Truth.TRUE or (target.value is Truth.UNKNOWN and after is Truth.FALSE):

@@ -1,4 +1,5 @@
-"""The paper's Algorithm 3: refine a tree until its simulation reaches the target.
+"""The strategy ``refine``: backward chaining by the paper's Algorithm 3, which refines a tree until its
+simulation reaches the target.
 
 Steps, numbered as in the paper: 1 simulate; 2 find the most probable deepest failed condition;
 3 if an action of a later branch undid it, move that branch; 4 otherwise insert an action or a

@@ -1,4 +1,4 @@
-"""The strategy ``search``: a best-first search over refinements of reactive trees.
+"""The strategy ``search``: backward chaining by best-first search over refinements of reactive trees.
 
 A tree grows from the goal by backward chaining (Colledanchise, Almeida, Ögren, "Towards Blended
 Reactive Planning and Acting using Behavior Trees", 2019): a condition that is false gets an action under a
@@ -15,7 +15,8 @@ Of a small task the search first finds what any policy can reach, and looks for 
    that leads into a dead end is backed out of. Of the others, the one comes first whose refinements were
    ranked best when they were chosen.
 3. If runs go round in a circle, branches that undo one another are put into another order; otherwise the
-   most probable repairable state gets an insertion, cheapest in the relaxation first (:mod:`search_moves`).
+   most probable repairable state gets an insertion, cheapest in the relaxation first
+   (:mod:`bbtc.planner.chaining.moves`).
 4. Where the target is reached, the tree is made smaller: what does not change any run, and then
    alternatives that the target does not need. Then attempts are bounded.
 """
@@ -44,7 +45,7 @@ from bbtc.planner.chaining.moves import Insertion, Move, Moves, forward, separat
 from bbtc.planner.finish import GRACE, finish
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.h_add import possible
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement
 from bbtc.rewrite.simplify import size
@@ -305,7 +306,7 @@ def possible_target(task: Task, target: Fraction, limits: Limits) -> Fraction:
     try:
         space = explore_space(task, replace(limits, states=min(limits.states, _FEW_STATES)))
         if space.complete:
-            return min(target, reachability(space, limits).initial.upper)
+            return min(target, max_prob(space, limits).initial.upper)
     except LimitReached:
         limits.check_time("planning")
     return target

@@ -25,7 +25,7 @@ from bbtc.limits import Limits
 from bbtc.planner.mdp.explore import Choices, Explorer
 from bbtc.planner.mdp.graph import Floats, Graph, sums
 from bbtc.planner.mdp.h_add import Costs, Relaxation
-from bbtc.planner.mdp.maxprob import Bounds, Reachability, draw_probabilities, reachability
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, draw_probabilities, max_prob
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
@@ -45,7 +45,7 @@ class Searched:
     policy attains the lower bound), and the bounds on P*. ``stop`` says which limit ended it before
     the bounds met, if one did; ``interrupted`` tells that the user did."""
 
-    lower: Reachability
+    lower: MaxProb
     bounds: Bounds
     stop: Diagnostic | None
     interrupted: bool = False
@@ -60,8 +60,8 @@ class Searched:
 class _Solved:
     space: StateSpace
     graph: Graph
-    lower: Reachability
-    upper: Reachability
+    lower: MaxProb
+    upper: MaxProb
 
     @property
     def bounds(self) -> Bounds:
@@ -112,11 +112,11 @@ class _Search:
         return bounds.upper - bounds.lower <= _CLOSED
 
     def _solve(self) -> _Solved:
-        space = self.explorer.space(~self.closed, (), None)
+        space = self.explorer.space(~self.closed, None)
         graph = Graph(space)
-        lower = reachability(space, self.limits, graph=graph, rationals=False)
+        lower = max_prob(space, self.limits, graph=graph, rationals=False)
         hope = space.goal | space.fringe
-        upper = reachability(space, self.limits, hope, graph=graph, rationals=False)
+        upper = max_prob(space, self.limits, hope, graph=graph, rationals=False)
         solved = _Solved(space, graph, lower, upper)
         bounds = solved.bounds
         self.limits.tell(
@@ -134,12 +134,12 @@ class _Search:
         """The last solution once more, in rationals where that is possible."""
         lower, bounds = solved.lower, solved.bounds
         try:
-            lower = reachability(solved.space, self.limits, graph=solved.graph)
+            lower = max_prob(solved.space, self.limits, graph=solved.graph)
             low = max(bounds.lower, lower.initial.lower)
             bounds = Bounds(low, max(low, bounds.upper))
             if bounds.exact is None and bounds.upper - low <= _CLOSED:
                 hope = solved.space.goal | solved.space.fringe
-                upper = reachability(solved.space, self.limits, hope, graph=solved.graph).initial.upper
+                upper = max_prob(solved.space, self.limits, hope, graph=solved.graph).initial.upper
                 bounds = Bounds(low, max(low, min(bounds.upper, upper)))
         except LimitReached:
             pass
@@ -152,7 +152,7 @@ class _Search:
         how probable they are."""
         space, graph, lower, upper = solved.space, solved.graph, solved.lower, solved.upper
         allowed = upper.best.copy()
-        met = (lower.lower >= upper.upper - _CLOSED) & ~upper.zero & ~space.goal
+        met = (lower.lower >= upper.upper - _CLOSED) & ~upper.prob_0 & ~space.goal
         allowed[met[graph.choice_state]] = False
         own = lower.policy[met]
         allowed[own[own >= 0]] = True

@@ -187,7 +187,7 @@ class Explorer:
         )
         return Choices(owner, action, edges, target, draw)
 
-    def space(self, fringe: Flags, levels: tuple[int, ...], stop: Diagnostic | None) -> StateSpace:
+    def space(self, fringe: Flags, stop: Diagnostic | None) -> StateSpace:
         """What was found so far; ``fringe`` says which states count as not expanded."""
         owner = np.asarray(self._owner.joined(), dtype=np.int32)
         action = np.asarray(self._action.joined(), dtype=np.int32)
@@ -206,7 +206,6 @@ class Explorer:
             states=self.table.states.copy(),
             goal=self.goal(),
             fringe=fringe,
-            levels=levels,
             choice_state=owner,
             choice_action=action,
             edge_choice=np.repeat(np.arange(len(owner), dtype=np.int32), edge_count),
@@ -225,15 +224,14 @@ def explore_space(task: Task, limits: Limits, depth: int | None = None) -> State
     """
     explorer = Explorer(task, limits)
     stop: Diagnostic | None = None
-    levels = [0]
-    done = 0
+    done = steps = 0
     try:
-        while done < explorer.count and (depth is None or len(levels) <= depth):
+        while done < explorer.count and (depth is None or steps < depth):
             level_end = explorer.count
             while done < level_end:
                 done += explorer.expand(np.arange(done, level_end), limits)
-            levels.append(level_end)
+            steps += 1
     except LimitReached as reached:
         stop = reached.diagnostics[0]
     fringe = np.arange(explorer.count) >= done
-    return explorer.space(fringe & ~explorer.goal(), tuple(levels), stop)
+    return explorer.space(fringe & ~explorer.goal(), stop)

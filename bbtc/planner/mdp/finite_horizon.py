@@ -1,4 +1,5 @@
-"""The best probability of reaching the goal with at most k actions, by backward induction."""
+"""MaxProb within a finite horizon: the best probability of reaching the goal with at most k actions, by
+backward induction (Puterman, "Markov decision processes", 1994)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Graph questions about a state space that need no numbers: what can reach the goal, what can
-reach it for sure, and in which sets of states a policy can stay for ever.
+"""Qualitative reachability in a Markov decision process, which needs no numbers: where the best probability
+of reaching the goal is 0 (prob-0), where it is 1 (prob-1), and the maximal end components, sets of states in
+which a policy can stay for ever.
 
-Source: Baier and Katoen, "Principles of Model Checking" (2008), section 10.6 (the sets where the
-maximal probability is 0 or 1, and end components).
+Source: Baier and Katoen, "Principles of Model Checking" (2008), section 10.6.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ class Graph:
         self._into_first: Index = np.concatenate(([0], np.cumsum(counts)))
 
     def reach(self, targets: Flags, allowed: Flags | None = None, ahead: Number | None = None) -> Reached:
-        """What may reach the targets by allowed choices (all by default). ``ahead`` tells how many
-        steps each target counts for itself; 0 by default."""
+        """What may reach the targets by allowed choices (all by default); the rest is prob-0. ``ahead`` tells
+        how many steps each target counts for itself; 0 by default."""
         depth = np.full(self.states, -1, dtype=np.int32)
         via = np.full(self.states, -1, dtype=np.int32)
         waiting = np.flatnonzero(targets)
@@ -93,9 +93,10 @@ class Graph:
         hit[self.edge_choice[states[self.space.edge_target]]] = True
         return hit
 
-    def surely(self, targets: Flags, some: Reached | None = None) -> Reached:
-        """Where the targets can be reached with probability 1, with choices that do so and never
-        leave that set. ``some`` is what :meth:`reach` finds for the targets, if that is known."""
+    def prob_1(self, targets: Flags, some: Reached | None = None) -> Reached:
+        """Where the targets can be reached with probability 1, with choices that do so and never leave that
+        set: a strong cyclic policy (Cimatti et al. 2003). ``some`` is what :meth:`reach` finds for the
+        targets, if that is known."""
         reached = self.reach(targets) if some is None else some
         while True:
             lost = ~reached.found
@@ -106,8 +107,8 @@ class Graph:
             reached = again
 
     def end_components(self, staying: Flags) -> list[list[int]]:
-        """Maximal sets of states in which a policy can stay for ever by choices of ``staying``
-        (it must be able to reach all of the set from all of it)."""
+        """Maximal end components: sets of states in which a policy can stay for ever by choices of
+        ``staying`` (it must be able to reach all of the set from all of it)."""
         staying = staying.copy()
         while True:
             # Drop choices that may lead where there is no such choice, until none is left.

@@ -58,14 +58,10 @@ class Operator(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Facts:
-    """What is possible from a state in the relaxation, a superset of the truth. A pair of variable and
-    value is ``in`` it if it is; ``costs`` holds what each takes, infinite where impossible."""
+    """What is possible from a state in the relaxation, a superset of the truth: ``costs`` holds what each
+    value of each variable takes, infinite where impossible."""
 
     costs: Costs
-
-    def __contains__(self, fact: tuple[int, int]) -> bool:
-        variable, value = fact
-        return bool(self.costs[3 * variable + value] < _NEVER)
 
     def cost(self, condition: Condition) -> float:
         """What it takes to make the condition true; infinite if it is impossible."""

@@ -1,9 +1,9 @@
-"""P*: the best probability with which any policy ever reaches the goal, state by state.
+"""MaxProb: the best probability with which any policy ever reaches the goal, P*, state by state.
 
-1. States with value 0 and 1 are found in the graph (:mod:`bbtc.planner.mdp.graph`).
+1. States with value 0 and 1 are found in the graph (prob-0 and prob-1, :mod:`bbtc.planner.mdp.graph`).
 2. For the others, interval iteration closes in from below and, with end components merged to
-   single states, from above (Haddad and Monmege 2018). Rounding is accounted for, so that the
-   bounds hold.
+   single states, from above (Haddad and Monmege 2018), by Bellman updates of all states. Rounding is
+   accounted for, so that the bounds hold.
 3. Where the numbers are modest, the policy found is solved in rationals and improved until no
    choice is better: then its value is P* exactly, for it is reached by a policy and, being a
    solution of the optimality inequalities, an upper bound for all of them (Park induction; it
@@ -48,10 +48,10 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Reachability:
+class MaxProb:
     """P* of every state of a complete space.
 
-    ``one`` and ``zero`` are the states with these values; ``lower`` and ``upper`` bound the value
+    ``prob_1`` and ``prob_0`` are the states with these values; ``lower`` and ``upper`` bound the value
     of every state; ``exact`` holds the values of the other states, if they were found exactly.
     ``best[c]`` tells that choice c attains its state's value (where not exact: as far as floats
     tell). ``policy[s]`` is a choice for every state with positive value; following it attains P*.
@@ -59,8 +59,8 @@ class Reachability:
 
     space: StateSpace
     graph: Graph
-    one: Flags
-    zero: Flags
+    prob_1: Flags
+    prob_0: Flags
     lower: Floats
     upper: Floats
     exact: dict[int, Fraction] | None
@@ -69,8 +69,8 @@ class Reachability:
 
     def bounds(self, state: int) -> Bounds:
         """The value of one state."""
-        if self.one[state] or self.zero[state]:
-            value = _ONE if self.one[state] else _ZERO
+        if self.prob_1[state] or self.prob_0[state]:
+            value = _ONE if self.prob_1[state] else _ZERO
             return Bounds(value, value)
         if self.exact is not None:
             return Bounds(self.exact[state], self.exact[state])
@@ -92,14 +92,14 @@ def draw_probabilities(space: StateSpace) -> Floats:
     return found
 
 
-def reachability(
+def max_prob(
     space: StateSpace,
     limits: Limits,
     goal: Flags | None = None,
     *,
     graph: Graph | None = None,
     rationals: bool = True,
-) -> Reachability:
+) -> MaxProb:
     """P* of reaching ``goal`` (by default the task's) in the part of a space that was expanded.
 
     ``graph`` is the space's, if it was made before; without ``rationals`` the values of states that
@@ -110,7 +110,7 @@ def reachability(
     graph = Graph(space) if graph is None else graph
     targets = space.goal if goal is None else goal
     reached = graph.reach(targets)
-    some, surely = reached.found, graph.surely(targets, reached)
+    some, surely = reached.found, graph.prob_1(targets, reached)
     one, maybe = surely.found, some & ~surely.found
     lower, upper = one.astype(np.float64), some.astype(np.float64)
     best = np.zeros(graph.choices, dtype=np.bool_)
@@ -130,7 +130,7 @@ def reachability(
             values = np.array([float(exact[s]) for s in part.states.tolist()])
             best[part.choices] = part.exact_ties(exact, values)
             lower[part.states] = upper[part.states] = values
-    return Reachability(space, graph, one, ~some, lower, upper, exact, best, policy)
+    return MaxProb(space, graph, one, ~some, lower, upper, exact, best, policy)
 
 
 class _Part:
@@ -160,13 +160,13 @@ class _Part:
         self.one = one
 
     def choice_values(self, values: Floats) -> Floats:
-        """The value of each choice, given those of the states."""
+        """The Q-value of each choice, given the values of the states."""
         part = sums(self.edge_choice, self.weight * values[self.edge_target], len(self.choices))
         found: Floats = self.win + part
         return found
 
-    def sweep(self, values: Floats) -> Floats:
-        """One step of value iteration."""
+    def update(self, values: Floats) -> Floats:
+        """The Bellman update of every state: one step of value iteration."""
         found: Floats = np.maximum.reduceat(self.choice_values(values), self.first)
         return found
 
@@ -252,7 +252,7 @@ class _Part:
         return bool(gain)
 
     def exact_value(self, choice: int, values: list[Fraction]) -> Fraction:
-        """The value of a choice, given those of the states by local number."""
+        """The Q-value of a choice, given the values of the states by local number."""
         win, row = self.row(choice)
         return win + sum((p * values[target] for target, p in row.items()), _ZERO)
 
@@ -274,7 +274,7 @@ def _iterate(part: _Part, limits: Limits) -> tuple[Floats, Floats]:
     while True:  # from below
         before = low
         for _ in range(_CHECK_EVERY):
-            low = part.sweep(low)
+            low = part.update(low)
         sweeps += _CHECK_EVERY
         if float((low - before).max()) < _CLOSE or _time_is_over(limits):
             break

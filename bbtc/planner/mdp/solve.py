@@ -13,7 +13,7 @@ from bbtc.limits import Limits
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
-from bbtc.planner.mdp.maxprob import Bounds, Reachability, reachability
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.state_space import StateSpace
 
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space
@@ -26,7 +26,7 @@ class Best:
     ``stop`` is the limit that left the bounds apart, if one did; ``interrupted`` tells that the user
     did."""
 
-    found: Reachability
+    found: MaxProb
     bounds: Bounds
     stop: Diagnostic | None = None
     interrupted: bool = False
@@ -46,7 +46,7 @@ def best_known(task: Task, limits: Limits, target: Fraction | None = None, *, wh
     """
     space = explore_space(task, limits if whole else limits.part(_SHARE))
     if space.complete:
-        found = reachability(space, limits)
+        found = max_prob(space, limits)
         return Best(found, found.initial)
     if whole:
         assert space.stop is not None

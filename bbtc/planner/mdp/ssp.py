@@ -1,4 +1,4 @@
-"""The least expected cost among the policies that attain P*: a stochastic shortest path.
+"""The least expected cost among the policies that attain P*: a stochastic shortest path problem (SSP).
 
 A policy may use the choices that attain P* and must end, in a goal or where the goal is out of
 reach. Policy iteration starts from one that ends and switches on strict improvement only; with
@@ -16,7 +16,7 @@ import numpy as np
 
 from bbtc.limits import Limits
 from bbtc.planner.mdp.graph import Floats, sums
-from bbtc.planner.mdp.maxprob import Reachability, draw_probabilities, solved
+from bbtc.planner.mdp.maxprob import MaxProb, draw_probabilities, solved
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.state_space import Number
 from bbtc.rounding import rounded
@@ -40,7 +40,7 @@ class LeastCost:
     best: Flags
 
 
-def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None = None) -> LeastCost | None:
+def least_cost(found: MaxProb, limits: Limits, costs: list[Fraction] | None = None) -> LeastCost | None:
     """The least expected cost; None where a cost is negative or P* is not known well enough.
 
     ``costs`` gives the cost of each draw; by default, the action's cost and its outcome's. Raises
@@ -52,7 +52,7 @@ def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None
     table = [draw.cost for draw in space.draws] if costs is None else costs
     if any(table[draw] < 0 for draw in np.unique(space.edge_draw)):
         return None
-    transient = ~found.zero & ~space.goal
+    transient = ~found.prob_0 & ~space.goal
     if not transient.any():
         empty = np.full(graph.states, -1, dtype=np.int32)
         return LeastCost(_ZERO, True, np.zeros(graph.states), empty, np.zeros(graph.choices, dtype=np.bool_))
@@ -73,7 +73,7 @@ def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None
 
 
 class _System:
-    def __init__(self, found: Reachability, table: list[Fraction], transient: Flags) -> None:
+    def __init__(self, found: MaxProb, table: list[Fraction], transient: Flags) -> None:
         self.found, self.table = found, table
         self.space, self.graph = found.space, found.graph
         self.states = np.flatnonzero(transient)
@@ -87,7 +87,7 @@ class _System:
         self.cost = sums(self.graph.edge_choice, weights, self.graph.choices)
 
     def choice_values(self, values: Floats) -> Floats:
-        """Expected cost of each choice, given that of the states."""
+        """The Q-value of each choice, its expected cost, given that of the states."""
         weights = self.weight * values[self.space.edge_target]
         found: Floats = self.cost + sums(self.graph.edge_choice, weights, self.graph.choices)
         return found

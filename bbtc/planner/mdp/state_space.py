@@ -1,4 +1,4 @@
-"""Markov decision processes in flat arrays: which choices states have, and where each may lead."""
+"""Markov decision processes (MDPs) in flat arrays: which choices states have, and where each may lead."""
 
 from __future__ import annotations
 
@@ -82,15 +82,13 @@ class StateSpace(Branching):
     state are left out.
 
     ``fringe`` are the states that were found, but not expanded, because of a limit (``stop``) or the
-    depth asked for, or because they did not seem to matter. ``levels[d]`` is the first state that
-    takes ``d`` actions to reach, where the space was explored breadth first.
+    depth asked for, or because they did not seem to matter.
     """
 
     task: Task
     packing: Packing
     states: Words
     fringe: Flags
-    levels: tuple[int, ...]
     edge_draw: Number
     draws: tuple[Draw, ...]
     initial: tuple[tuple[Fraction, int], ...]

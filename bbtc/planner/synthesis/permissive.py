@@ -1,7 +1,8 @@
-"""The states that matter for a policy, and the choices open to it in each.
+"""Multi-policies (permissive strategies: Dräger et al. 2015): the states that matter for a policy, and all
+choices that are as good in each.
 
-Every way of taking the choices offered here reaches the goal with the best probability, and at the
-least expected cost where that is known; a tree may take whichever makes it smaller.
+Every way of taking them reaches the goal with the best probability, and at the least expected cost where that
+is known; a tree may take whichever makes it smaller.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.maxprob import Reachability
+from bbtc.planner.mdp.maxprob import MaxProb
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.ssp import LeastCost, least_cost
 from bbtc.planner.mdp.state_space import Branching, Number, StateSpace
@@ -26,17 +27,17 @@ MOST_STATES = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MultiPolicy(Branching):
-    """For every state, choices that are equally good: a set of policies (a multi-policy, or permissive
-    strategy: Dräger et al. 2015), over a part of a space with state numbers of its own. ``values`` are the
-    states, and ``initial`` those that runs start in. States without choices end a run: in the goal, because
-    the goal is out of reach, or because nothing can start there for want of attempts (``idle``)."""
+    """For every state, choices that are equally good, over a part of a space with state numbers of its own.
+    ``values`` are the states, and ``initial`` those that runs start in. States without choices end a run: in
+    the goal, because the goal is out of reach, or because nothing can start there for want of attempts
+    (``idle``)."""
 
     values: npt.NDArray[np.uint8]
     idle: Flags
     initial: Index
 
 
-def best_multi_policy(found: Reachability, limits: Limits) -> tuple[MultiPolicy, LeastCost | None]:
+def best_multi_policy(found: MaxProb, limits: Limits) -> tuple[MultiPolicy, LeastCost | None]:
     """The choices of the cheapest among the best policies; of one of them where they are too many,
     and of one of the best where costs are not known. Raises ``LimitReached`` when the time is over."""
     cheapest = least_cost(found, limits)
@@ -56,7 +57,7 @@ def best_multi_policy(found: Reachability, limits: Limits) -> tuple[MultiPolicy,
     return offered, cheapest
 
 
-def likely_policy(found: Reachability, most: int) -> MultiPolicy | None:
+def likely_policy(found: MaxProb, most: int) -> MultiPolicy | None:
     """The choices of one best policy in the states that its runs visit most probably, ``most`` of them,
     where there are more; None where there are not. Elsewhere a run ends."""
     space = found.space
@@ -82,7 +83,7 @@ def likely_policy(found: Reachability, most: int) -> MultiPolicy | None:
     return multi_policy(space, only)
 
 
-def _fewest_actions(found: Reachability, limits: Limits) -> tuple[Number, Flags]:
+def _fewest_actions(found: MaxProb, limits: Limits) -> tuple[Number, Flags]:
     shortest = least_cost(found, limits, [Fraction(1)] * len(found.space.draws))
     if shortest is not None and shortest.exact:
         return shortest.policy, shortest.best

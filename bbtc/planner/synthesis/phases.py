@@ -1,4 +1,4 @@
-"""Policies within a number of actions, as phases: in each, a state has choices that are optimal
+"""Policies for a finite horizon, as phases with a multi-policy each: its choices are optimal
 whatever number of actions is left there.
 
 A tree does not count its steps, but a retry node bounds how many actions start below it. Where one

@@ -1,4 +1,4 @@
-"""From the states that matter to a short list of rules: "if these literals hold, do this action".
+"""From a multi-policy to a decision list, a short list of rules: "if these literals hold, do this action".
 
 Rules are tried in order. They are found greedily, the one that decides most states for its size
 first (separate and conquer: Fürnkranz 1999); after each, states that no run visits any more are
