@@ -207,7 +207,7 @@ class _Part:
             p = space.draws[draw].probability
             number = int(self.number[target])
             if number >= 0:
-                row[number] = row.get(number, _ZERO) + p
+                row[number] = row[number] + p if number in row else p
             elif self.one[target]:
                 win += p
         return win, row

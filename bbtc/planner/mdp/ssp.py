@@ -137,7 +137,7 @@ class _System:
             cost += p * self.table[draw]
             target = int(self.number[state])
             if target >= 0:
-                row[target] = row.get(target, _ZERO) + p
+                row[target] = row[target] + p if target in row else p
         return cost, row
 
     def exact(self, policy: Number, limits: Limits) -> list[Fraction] | None:

@@ -47,10 +47,6 @@ class Branching:
         first = self._edge_first[choices]
         return ranges(first, self._edge_first[choices + 1] - first)
 
-    def edges(self, choice: int) -> slice:
-        """Those of one choice."""
-        return slice(int(self._edge_first[choice]), int(self._edge_first[choice + 1]))
-
     def having(self, choices: Flags | None = None) -> Flags:
         """The states that have any of some choices (by default: any at all)."""
         found = np.zeros(len(self.goal), dtype=np.bool_)
@@ -111,8 +107,8 @@ class StateSpace(Branching):
 
     def outcomes(self, choice: int) -> Iterator[tuple[int, int]]:
         """Where a choice may lead, and the number of the draw that does."""
-        edges = self.edges(choice)
-        return zip(self.edge_target[edges].tolist(), self.edge_draw[edges].tolist(), strict=True)
+        first, end = self._edge_first[choice : choice + 2].tolist()
+        return zip(self.edge_target[first:end].tolist(), self.edge_draw[first:end].tolist(), strict=True)
 
 
 def ranges(firsts: Index, counts: Index) -> Index:
