@@ -1,11 +1,10 @@
 """Smaller trees that still reach the target: alternatives that it does not take are dropped.
 
-Rewrite rules, each kept if the tree is still worth it (:meth:`_Worth.will_do`); k is a Fallback or a Skipper:
+Rewrite rule, kept if the tree is still worth it (:meth:`_Worth.will_do`); k is a Fallback or a Skipper:
 
-1. ``k(…, c, …)`` becomes ``k(…, …)`` for a branch c with actions.
-2. ``k(c, d)`` becomes ``d``, or ``c``, likewise.
+1. ``k(…, c, …)`` becomes ``k(…, …)`` for a branch c with actions, and ``k(c, d)`` becomes ``d``.
 
-The smallest tree that a rule makes is tried first; what is left is simplified (:mod:`bbtc.rewrite.simplify`).
+The smallest tree that it makes is tried first; what is left is simplified (:mod:`bbtc.rewrite.simplify`).
 """
 
 from __future__ import annotations
@@ -98,6 +97,6 @@ def _without_one(node: Node) -> Iterator[Node]:
     for at, child in enumerate(node.children):
         rest = (*node.children[:at], *node.children[at + 1 :])
         if node.kind in {"fallback", "skipper"} and rest and any(actions_of(child)):
-            yield rest[0] if len(rest) == 1 else replace(node, children=rest)  # rule 2, else rule 1
+            yield rest[0] if len(rest) == 1 else replace(node, children=rest)  # rule 1
         for smaller in _without_one(child):
             yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))

@@ -3,20 +3,19 @@
 Rewrite rules, for a control node k (Sequence, Fallback or Skipper). What a node ever returns is read off
 every state that a run can visit; with "goes on" for the status after which k ticks its next child:
 
-1. ``k(…, c, …)`` becomes ``k(…, …)`` if c never does anything but go on, or is never ticked.
-2. ``k(…, c, d, …)`` becomes ``k(…, c)`` if c never goes on.
-3. ``k(…, k(x, …), …)`` becomes ``k(…, x, …, …)``.
-4. ``k(c)`` becomes ``c``.
+1. ``k(…, c, …)`` becomes ``k(…, …)`` if c never does anything but go on, or is never ticked (as what stands
+   behind a child that never goes on).
+2. ``k(…, k(x, …), …)`` becomes ``k(…, x, …, …)``.
+3. ``k(c)`` becomes ``c``.
 
 These change nothing in any state that is visited. The others are tried, and kept if both trees, run side by
 side, do the same (:mod:`bbtc.belief.same_runs`); k is a Sequence or a Fallback and j the other of the two:
 
-5. ``k(…, c, c, …)`` becomes ``k(…, c, …)``.
-6. ``k(…, j(a, x…), j(a, y…), …)`` becomes ``k(…, j(a, k(j(x…), j(y…))), …)`` for a condition a, wherever it
+4. ``k(…, j(a, x…), j(a, y…), …)`` becomes ``k(…, j(a, k(j(x…), j(y…))), …)`` for a condition a, wherever it
    stands among its neighbours.
-7. ``k(…, j(x…, a), j(y…, a), …)`` becomes ``k(…, j(k(j(x…), j(y…)), a), …)`` for an action a, likewise.
+5. ``k(…, j(x…, a), j(y…, a), …)`` becomes ``k(…, j(k(j(x…), j(y…)), a), …)`` for an action a, likewise.
 
-Rules 1 to 4 are applied until nothing changes, then one of 5 to 7, and so on. The result as a whole is
+Rules 1 to 3 are applied until nothing changes, then one of 4 and 5, and so on. The result as a whole is
 compared with the tree given, in the same way. Templates keep the shape that their author gave them.
 """
 
@@ -95,7 +94,7 @@ def numbered(root: Node) -> Node:
     return visit(root)
 
 
-# --- what never matters: rules 1 to 4 --------------------------------------------------------
+# --- what never matters: rules 1 to 3 --------------------------------------------------------
 
 
 def _returned(task: Task, root: Node, chain: Chain, limits: Limits) -> dict[str, set[int]]:
@@ -110,7 +109,7 @@ def _returned(task: Task, root: Node, chain: Chain, limits: Limits) -> dict[str,
 
 
 def without_idle_branches(task: Task, root: Node, chain: Chain, limits: Limits) -> Node:
-    """Rule 1 for those alternatives of Fallbacks that hold actions, and rule 4 for Fallbacks: the tree
+    """Rule 1 for those alternatives of Fallbacks that hold actions, and rule 3 for Fallbacks: the tree
     without branches that were tried in vain, its tests as they are. The root itself is returned where nothing
     was taken out. Raises ``LimitReached`` when the time is over."""
     returned = _returned(task, root, chain, limits)
@@ -132,7 +131,7 @@ def without_idle_branches(task: Task, root: Node, chain: Chain, limits: Limits) 
 
 
 def _without_idle(task: Task, root: Node, chain: Chain, limits: Limits) -> Node:
-    """Rules 1 to 4, until nothing more is found."""
+    """Rules 1 to 3, until nothing more is found."""
     returned = _returned(task, root, chain, limits)
 
     def kept(node: Node) -> Node:
@@ -143,15 +142,12 @@ def _without_idle(task: Task, root: Node, chain: Chain, limits: Limits) -> Node:
         goes_on = GOES_ON[node.kind]
         children: list[Node] = []
         for child in node.children:
-            seen = returned[child.id]
-            if seen - {goes_on}:  # else rule 1
-                children.extend(_dissolved(node.kind, kept(child)))  # rule 3
-            if goes_on not in seen:
-                break  # rule 2
+            if returned[child.id] - {goes_on}:  # else rule 1
+                children.extend(_dissolved(node.kind, kept(child)))  # rule 2
         if not children:
             children = [kept(node.children[0])]
         if len(children) == 1:
-            return children[0]  # rule 4
+            return children[0]  # rule 3
         return replace(node, children=tuple(children))
 
     return kept(root)
@@ -163,11 +159,11 @@ def _dissolved(kind: ControlKind, child: Node) -> Sequence[Node]:
     return (child,)
 
 
-# --- what stands twice: rules 5 to 7 ---------------------------------------------------------
+# --- what stands twice: rules 4 and 5 --------------------------------------------------------
 
 
 def _shared(task: Task, root: Node, chain: Chain, limits: Limits) -> Node | None:
-    """Rule 5, 6 or 7, once: the first smaller tree that does the same; None if there is none."""
+    """Rule 4 or 5, once: the first smaller tree that does the same; None if there is none."""
     for tried, smaller in enumerate(_merged(root)):
         limits.check_time("the search for a small tree")
         if tried * len(chain.states) > _MOST_TICKS:
@@ -193,9 +189,6 @@ def _merged(node: Node) -> Iterator[Node]:
 
 
 def _pair(above: ControlNode, inner: ControlKind, one: Node, other: Node) -> Iterator[Node]:
-    if _same(one, other):
-        yield one  # rule 5
-        return
     first, second = _parts(inner, one), _parts(inner, other)
     if isinstance(other, ControlNode) and len(second) > 1:
         for part in first:
@@ -211,7 +204,7 @@ def _pair(above: ControlNode, inner: ControlKind, one: Node, other: Node) -> Ite
                 choice = ControlNode(
                     f"{other.id}.or", above.kind, tuple(each for each in rest if each is not None)
                 )
-                # Rule 6, else rule 7.
+                # Rule 4, else rule 5.
                 order = (part, choice) if isinstance(part, ConditionNode) else (choice, part)
                 yield replace(other, kind=inner, children=order)
 
