@@ -160,3 +160,22 @@ def test_conditions_of_any_shape_become_cubes() -> None:
     packing = space_packing.Packing((2, None), 1)
     assert space_packing.bit_test(packing, TRUE) == space_packing.ALWAYS
     assert space_packing.bit_test(packing, Is(1, Truth.UNKNOWN)) == space_packing.NEVER
+
+
+@settings(deadline=None, suppress_health_check=list(HealthCheck))
+@given(task=tasks(nested=2), every=st.integers(1, 3))
+def test_the_closure_is_what_a_walk_over_single_choices_finds(task: Task, every: int) -> None:
+    space = explore_space(task, Limits())
+    taken = np.arange(len(space.choice_action)) % every == 0
+    found, waiting = set(space.start.tolist()), space.start.tolist()
+    while waiting:
+        for choice in space.choices_of(np.array([waiting.pop()])).tolist():
+            for target, _ in space.outcomes(choice) if taken[choice] else ():
+                if target not in found:
+                    found.add(target)
+                    waiting.append(target)
+    closed = space.closure(space.start, taken).tolist()
+    assert len(closed) == len(set(closed))
+    assert set(closed) == found
+    if every == 1:
+        assert len(found) == len(space.states)
