@@ -14,8 +14,8 @@ from bbtc.planner.result import Plan
 from bbtc.tree.nodes import PlanStatus
 
 if TYPE_CHECKING:
-    from bbtc.planner.mdp.explore import StateSpace
     from bbtc.planner.mdp.maxprob import Bounds
+    from bbtc.planner.mdp.state_space import StateSpace
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from bbtc.ground.repair import Every, Need, Repairs, Root, Some, Way, every, som
 from bbtc.ground.task import Effect, GroundAction, Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.planner.chaining.relaxed import Facts, RelaxedReachability, possible
+from bbtc.planner.mdp.h_add import Facts, Relaxation, possible
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree
 
@@ -121,7 +121,7 @@ class RootFinder:
     def __init__(self, task: Task, limits: Limits) -> None:
         self._task = task
         self._limits = limits
-        self._relaxed = RelaxedReachability(task, limits)
+        self._relaxed = Relaxation(task, limits)
         self._makers: dict[_Fact, list[tuple[GroundAction, Effect]]] = {}
         for action in task.actions:
             for effect in effects_of(action.factors):

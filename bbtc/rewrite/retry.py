@@ -1,4 +1,10 @@
-"""How often to try again: the least number of attempts that meets a target."""
+"""How often to try again: the least number of attempts that meets a target.
+
+Rewrite rules, for a tree whose runs come back to a state; n is the least number that meets the target:
+
+1. ``t`` becomes ``Retry(n, t)`` for the smallest subtree t that holds all actions of such runs.
+2. Where that cannot meet the target, as what follows t takes over too late, t is the whole tree.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +35,7 @@ def with_least_attempts(task: Task, root: Node, target: Fraction, limits: Limits
     looping = _looping(explore(task, root, limits))
     if not looping:
         return root
-    for place in dict.fromkeys([_lowest_above(root, looping), root.id]):
+    for place in dict.fromkeys([_lowest_above(root, looping), root.id]):  # rule 1, else rule 2
         found = _least(task, root, place, target, limits)
         if found is not None:
             return found

@@ -1,4 +1,11 @@
-"""Smaller trees that still reach the target: alternatives that it does not take are dropped."""
+"""Smaller trees that still reach the target: alternatives that it does not take are dropped.
+
+Rewrite rule, kept if the tree is still worth it (:meth:`_Worth.will_do`); k is a Fallback or a Skipper:
+
+1. ``k(…, c, …)`` becomes ``k(…, …)`` for a branch c with actions, and ``k(c, d)`` becomes ``d``.
+
+The smallest tree that it makes is tried first; what is left is simplified (:mod:`bbtc.rewrite.simplify`).
+"""
 
 from __future__ import annotations
 
@@ -90,6 +97,6 @@ def _without_one(node: Node) -> Iterator[Node]:
     for at, child in enumerate(node.children):
         rest = (*node.children[:at], *node.children[at + 1 :])
         if node.kind in {"fallback", "skipper"} and rest and any(actions_of(child)):
-            yield rest[0] if len(rest) == 1 else replace(node, children=rest)
+            yield rest[0] if len(rest) == 1 else replace(node, children=rest)  # rule 1
         for smaller in _without_one(child):
             yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))

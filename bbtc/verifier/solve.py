@@ -4,6 +4,9 @@ The states are put into strongly connected components, those that are reached la
 and Sharir). In each, x = P x + c is solved for several right-hand sides at once by Gaussian
 elimination over rationals, the sparsest row first (Markowitz 1957). A state from which no end can be
 reached has value 0.
+
+This solver stands apart from ``bbtc.markov`` on purpose, with other algorithms: a fault there must not show
+here, too.
 """
 
 from __future__ import annotations

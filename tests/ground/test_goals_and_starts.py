@@ -16,7 +16,7 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.explore import explore_space
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.ssp import least_cost
 from tests.ground.examples import model_of, task_of
 
@@ -203,7 +203,7 @@ def test_what_no_action_changes_has_the_value_it_starts_with(
     init: str, condition: str, best: str, cost: str
 ) -> None:
     task = task_of(_TWO_CHANCES.format(init=init, condition=condition))
-    found = reachability(explore_space(task, Limits()), Limits())
+    found = max_prob(explore_space(task, Limits()), Limits())
     cheapest = least_cost(found, Limits())
     assert found.initial.exact == Fraction(best)
     assert cheapest is not None

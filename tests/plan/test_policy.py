@@ -23,7 +23,7 @@ from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan
@@ -84,7 +84,7 @@ def test_random_tasks_are_solved_at_their_best_and_least_cost(of: Task) -> None:
     check_tree(tree)
     chain = explore(of, tree.root, Limits())
     assert violations(of, chain) == []
-    found = reachability(explore_space(of, Limits()), Limits())
+    found = max_prob(explore_space(of, Limits()), Limits())
     assert tree.success_probability == simulate(of, tree.root, Limits()).success == found.initial.exact
     assert tree.status == ("target-reached" if tree.success_probability == 1 else "out-of-reach")
     assert tree.bounds == (tree.success_probability, tree.success_probability)
@@ -161,7 +161,7 @@ def test_where_no_number_of_tries_is_enough_there_is_no_bound() -> None:
 @given(of=tasks(), target=st.sampled_from(["1/3", "0.9", "0.999"]))
 def test_one_attempt_less_would_miss_the_target(of: Task, target: str) -> None:
     done = plan(of, target, options=DEFAULTS)
-    best = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    best = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert best is not None
     assert done.tree.success_probability <= best
     assert (done.tree.status == "target-reached") == (best >= Fraction(target))

@@ -17,7 +17,8 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp import packing as space_packing
 from bbtc.planner.mdp import transitions as space_actions
-from bbtc.planner.mdp.explore import StateSpace, explore_space
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.planner.mdp.state_table import StateTable
 from tests.strategies import tasks
 
@@ -56,10 +57,11 @@ def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
     for state, before in enumerate(values):
         assert before not in found, "a state stands twice"
         found[before] = {}
-        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
-            for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
-                draw = space.draws[space.edge_draw[edge]]
-                key = (space.action_name(choice), values[space.edge_target[edge]], draw.cost, draw.reward)
+        for choice in space.choices_of(np.array([state])).tolist():
+            name = space.task.actions[int(space.choice_action[choice])].name
+            for successor, number in space.outcomes(choice):
+                draw = space.draws[number]
+                key = (name, values[successor], draw.cost, draw.reward)
                 found[before][key] = found[before].get(key, Fraction(0)) + draw.probability
     return found
 
@@ -143,9 +145,9 @@ def test_an_action_that_draws_nothing_changes_nothing() -> None:
 
 def test_a_depth_leaves_the_rest_unexpanded() -> None:
     task = dataclasses.replace(lamps(70), goal=Is(0, Truth.FALSE))
-    assert explore_space(task, Limits(), depth=1).levels == (0, 1)
-    space = explore_space(task, Limits(), depth=2)
-    assert (space.levels, space.expanded, len(space.states)) == ((0, 1, 4), 4, 7)
+    for depth, (expanded, found) in enumerate([(0, 1), (1, 4), (4, 7)]):
+        space = explore_space(task, Limits(), depth=depth)
+        assert (space.expanded, len(space.states)) == (expanded, found)
     assert not space.complete
     assert space.stop is None
 
@@ -209,3 +211,22 @@ def test_conditions_over_several_words_hold_where_the_semantics_say(values: list
         test = space_packing.bit_test(packing, condition)
         expected = [evaluate(condition, bytes(row)) is Truth.TRUE for row in (values, values[::-1])]
         assert space_packing.holds(packing, test, rows).tolist() == expected
+
+
+@settings(deadline=None, suppress_health_check=list(HealthCheck))
+@given(task=tasks(nested=2), every=st.integers(1, 3))
+def test_the_closure_is_what_a_walk_over_single_choices_finds(task: Task, every: int) -> None:
+    space = explore_space(task, Limits())
+    taken = np.arange(len(space.choice_action)) % every == 0
+    found, waiting = set(space.start.tolist()), space.start.tolist()
+    while waiting:
+        for choice in space.choices_of(np.array([waiting.pop()])).tolist():
+            for successor, _ in space.outcomes(choice) if taken[choice] else ():
+                if successor not in found:
+                    found.add(successor)
+                    waiting.append(successor)
+    closed = space.closure(space.start, taken).tolist()
+    assert len(closed) == len(set(closed))
+    assert set(closed) == found
+    if every == 1:
+        assert len(found) == len(space.states)

@@ -28,7 +28,7 @@ from bbtc.cli.session import (
 )
 from bbtc.diagnostics import LimitReached
 from bbtc.exit_status import OF_TREE, ExitStatus
-from bbtc.planner.strategies import DEFAULT
+from bbtc.planner.strategies import DEFAULT, others
 from bbtc.watch import importing
 
 if TYPE_CHECKING:
@@ -47,14 +47,14 @@ _TELLING = 1.0
 @click.option(
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
-@click.option("--strategy", default=DEFAULT, show_default=True, help="Or auto, search, policy, refine.")
+@click.option("--strategy", default=DEFAULT, show_default=True, help=f"Or {others()}.")
 @click.option("--max-actions", type=Count(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",
     type=click.Choice(["least", "unbounded"]),
     default="least",
     show_default=True,
-    help="Try again as often as the target takes, or without end (search, policy, auto).",
+    help=f"Try again as often as the target takes, or without end ({others(lambda each: each.retries)}).",
 )
 @click.option(
     "--guarded",

@@ -10,13 +10,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
+from typing_extensions import assert_never
+
 from bbtc.belief.state import State, Transition, Values, compile_action
-from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts, evaluate, variables
 from bbtc.ground.task import GroundAction, Task, effects_of
-from bbtc.kleene import Truth
+from bbtc.kleene import Truth, negate
 from bbtc.limits import Limits
 from bbtc.planner.chaining.draft import Doing, Subgoal, changed_by
-from bbtc.planner.chaining.relaxed import RelaxedReachability, helpful, possible
+from bbtc.planner.mdp.h_add import Relaxation, possible
 
 OBSERVABLE_SHARE = Fraction(1, 2)
 """An outcome that leaves a false condition unknown counts this much: it may still be observed true."""
@@ -80,7 +82,7 @@ class Chooser:
         self.task = task
         self.transitions = transitions
         self.limits = limits
-        self.reachability = RelaxedReachability(task, limits)
+        self.relaxation = Relaxation(task, limits)
         self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
         self._helps: dict[tuple[Subgoal, int, Truth, Values, frozenset[str]], bool] = {}
@@ -155,7 +157,7 @@ class Chooser:
         return tuple(c for c in conditions if changed.isdisjoint(variables(c)))
 
     def _applicable(self, conditions: tuple[Condition, ...], state: State) -> bool:
-        facts = self.reachability.facts(state.values)
+        facts = self.relaxation.facts(state.values)
         return all(possible(condition, facts) for condition in conditions)
 
     def _chances(
@@ -175,7 +177,7 @@ class Chooser:
             values = bytearray(state.values)
             for variable, value in forced.items():
                 values[variable] = value
-            may_hold = possible(goal, self.reachability.facts(state.values))
+            may_hold = possible(goal, self.relaxation.facts(state.values))
             for result in transition(bytes(values)):
                 after = evaluate(goal, result.values)
                 if after is Truth.TRUE or (flaw.value is Truth.UNKNOWN and after is Truth.FALSE):
@@ -211,6 +213,31 @@ class Chooser:
             if states and frozenset(conditions) not in tried:
                 share = sum((p for _, p in states), Fraction(0)) / flaw.probability
                 yield Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
+
+
+def helpful(condition: Condition, value: Truth) -> Iterator[tuple[int, Truth]]:
+    """The assignments that can make a condition true that now has the value: those that may make a part
+    of it true, or unknown, so that it can be observed; of an unknown one, those that tell. Repeats are
+    included."""
+    match condition:
+        case Is(variable, Truth.UNKNOWN):
+            yield variable, Truth.UNKNOWN
+        case Is(variable, wanted):
+            yield variable, wanted
+            yield variable, negate(wanted) if value is Truth.UNKNOWN else Truth.UNKNOWN
+        case Known(variable):
+            yield variable, Truth.TRUE
+            yield variable, Truth.FALSE
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from helpful(part, value)
+        case Not(part):
+            for variable in variables(part):
+                yield from ((variable, each) for each in Truth)
+        case Constant():
+            return
+        case _:
+            assert_never(condition)
 
 
 def circular(condition: Condition, goal: Condition, value: Truth) -> bool:

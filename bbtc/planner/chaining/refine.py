@@ -1,4 +1,5 @@
-"""The paper's Algorithm 3: refine a tree until its simulation reaches the target.
+"""The strategy ``refine``: backward chaining by the paper's Algorithm 3, which refines a tree until its
+simulation reaches the target.
 
 Steps, numbered as in the paper: 1 simulate; 2 find the most probable deepest failed condition;
 3 if an action of a later branch undid it, move that branch; 4 otherwise insert an action or a
@@ -32,7 +33,7 @@ from bbtc.planner.chaining.flaws import FlawFinder, Simulated
 from bbtc.planner.chaining.threats import find_threat
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement
-from bbtc.rewrite.prune import without_idle_branches
+from bbtc.rewrite.simplify import without_idle_branches
 from bbtc.tree.nodes import PlanStatus, walk
 
 PATIENCE = 30
