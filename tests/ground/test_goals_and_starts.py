@@ -383,3 +383,13 @@ def test_large_tasks_are_grounded_like_small_ones() -> None:
           (:init {roads} {facts}) (:goal (at t0 c7)))"""
     task = task_of(text)
     assert (len(task.actions), len(task.variables)) == (40, 40)
+
+
+def test_a_variable_has_the_place_where_it_is_given_or_else_where_it_is_declared() -> None:
+    task = task_of("""(define (domain d) (:predicates (dirty ?r) (seen ?r))
+      (:action clean :parameters (?r) :effect (and (not (dirty ?r)) (seen ?r))))
+    (define (problem p) (:domain d) (:objects hall) (:init (dirty hall))
+      (:goal (and (seen hall) (not (dirty hall)))))""")
+    places = {variable.name: variable.span for variable in task.variables}
+    words = {name: span.text for name, span in places.items() if span is not None}
+    assert words == {"dirty(hall)": "(dirty hall)", "seen(hall)": "seen"}
