@@ -27,6 +27,7 @@ from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan
+from bbtc.planner.synthesis.permissive import likely_policy
 from bbtc.planner.synthesis.rules import Literal, Rule
 from bbtc.planner.synthesis.rules import Test as ValueTest
 from bbtc.planner.synthesis.tree import _Builder
@@ -249,3 +250,24 @@ def test_many_rules_that_share_little_take_a_bounded_time_to_write_down() -> Non
     assert [each.action for node in nodes for each in walk(node) if isinstance(each, ActionNode)] == [
         each.name for each in of.actions
     ]
+
+
+def test_of_a_large_policy_the_states_most_often_visited_come_first() -> None:
+    """A walk of ten steps, each of which slips off its way with 1/10: the first states are the likeliest."""
+    steps = [
+        action(
+            f"step{i}",
+            conjunction([Is(i, T), Is(i + 1, F), Is(11, F)]),
+            ("9/10", {i + 1: T}),
+            ("1/10", {11: T}),
+        )
+        for i in range(10)
+    ]
+    of = task("a b c d e f g h i j k off", {0: T}, Is(10, T), *steps)
+    found = max_prob(explore_space(of, Limits()), Limits())
+    assert likely_policy(found, 100) is None, "all fit"
+    draft = likely_policy(found, 4)
+    assert draft is not None
+    assert sorted(of.actions[number].name for number in draft.choice_action) == [
+        "step0()", "step1()", "step2()", "step3()"
+    ]  # fmt: skip

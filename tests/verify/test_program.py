@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
+import pytest
+
 from bbtc.backends.models.prism import prism
 from bbtc.ground.condition import TRUE, Is
 from bbtc.kleene import Truth
@@ -15,6 +17,9 @@ from bbtc.verifier.program import (
     YES,
     AllOf,
     AnyOf,
+    Branch,
+    Charged,
+    Command,
     Compare,
     Drafting,
     Negation,
@@ -71,3 +76,15 @@ def test_what_says_nothing_is_not_written() -> None:
     assert (any_of(a, NO), all_of(a, YES), any_of(), all_of()) == (a, a, NO, YES)
     assert (any_of(a, any_of(b, a)), all_of(a, all_of(b, a))) == (AnyOf((a, b)), AllOf((a, b)))
     assert any_of(a, AllOf((b, none_of(a)))) == AnyOf((a, b))
+
+
+@pytest.mark.parametrize("number", [2, 20])
+def test_the_least_that_is_added_counts_what_takes_away(number: int) -> None:
+    """However many conditions there are to it, of which some add."""
+    amounts = [Fraction(-3), *(Fraction(1) for _ in range(number)), Fraction(-2)]
+    charges = [Charged(Compare(i, "=", 1), (amount,)) for i, amount in enumerate(amounts)]
+    branch = Branch(Fraction(1), (), (Fraction(7),), tuple(charges))
+    assert Command("act", YES, (branch,)).least(0) == 7 - 3 - 2
+    both = Charged(none_of(Compare(0, "=", 1)), (Fraction(-1),))
+    either = Branch(Fraction(1), (), (Fraction(0),), (charges[0], both))
+    assert Command("act", YES, (either,)).least(0) == -3, "never both"
