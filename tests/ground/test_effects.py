@@ -502,3 +502,13 @@ def test_what_earns_a_reward_matters_where_rewards_count(metric: str, kept: list
       (:action sing :effect (and (sung) (increase (total-cost) 2))))
     (define (problem p) (:domain d) (:init) (:goal (closed)) {metric})""")
     assert [action.name for action in task.actions] == kept
+
+
+def test_charges_under_one_condition_that_come_to_nothing_are_none() -> None:
+    task = task_of("""(define (domain d) (:requirements :rewards) (:predicates (lit) (done))
+      (:action act :effect (and (done)
+        (when (lit) (increase (reward) 2)) (when (lit) (decrease (reward) 2))))
+      (:action press :effect (lit)))
+    (define (problem p) (:domain d) (:init) (:goal (and (done) (lit))) (:metric maximize (reward)))""")
+    act = task.action_by_name["act()"]
+    assert list(charges_of(act.factors)) == []
