@@ -108,15 +108,6 @@ def corpus_folder() -> Path | None:
 
 
 @pytest.fixture(scope="session")
-def shared() -> Path:
-    """The folder of shared inputs; skips the test where it is absent."""
-    folder = shared_folder()
-    if folder is None:
-        pytest.skip("no folder ../shared beside the repository")
-    return folder
-
-
-@pytest.fixture(scope="session")
 def corpus() -> Path:
     """The corpus; skips the test where it is absent."""
     folder = corpus_folder()

@@ -4,7 +4,6 @@ read, or it is refused by its name and line."""
 from __future__ import annotations
 
 import random
-import re
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -15,6 +14,7 @@ from bbtc.artefacts.btcpp_patterns import READ
 from bbtc.artefacts.btcpp_unread import WITHOUT_MEANING
 from bbtc.export.btcpp_idioms import LATCH, SKIPPER
 from bbtc.tree.nodes import ControlNode, Node, Tree
+from tests import btcpp_nodes
 from tests.imports.engine_nodes import NODES, PORTS, SCRIPTS
 from tests.imports.samples import (
     PROFILES,
@@ -232,15 +232,13 @@ def test_a_node_is_read_or_refused_by_its_name_and_line(nodes: str, tag: str, po
             check_in_engine(TREE, text, rng)
 
 
-def test_the_nodes_are_those_of_the_engine(shared: Path) -> None:
+def test_the_nodes_are_those_of_the_engine() -> None:
     """Those that the engine itself lists."""
-    listed = ET.parse(shared / "backends" / "btcpp-builtin-nodes-4.10.0.xml").getroot()
-    for entry in listed.iter():
-        if entry.tag in ("Action", "Condition", "Control", "Decorator", "SubTree"):
-            ports = NODES[entry.tag.lower()][entry.attrib["ID"]]
-            assert {port.attrib["name"] for port in entry} == set(ports) - {"ID"}, entry.attrib["ID"]
-    schema = (shared / "backends" / "btcpp-builtin-4.10.0.xsd").read_text(encoding="utf-8")
-    assert set(re.findall(r'attribute name="(_\w+)"', schema)) == {*SCRIPTS, "_autoremap"}
+    for name, form in btcpp_nodes.NODES.items():
+        ports = NODES[form.kind.lower()][name]
+        assert set(form.attributes) - {"*", "ID"} == set(ports) - {"ID"}, name
+    own = {name for name in btcpp_nodes.EVERY_NODE.attributes if name.startswith("_")}
+    assert own == set(SCRIPTS)
 
 
 # --- the rest of a file ----------------------------------------------------------------------
