@@ -11,9 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from bbtc.codes import CODES
 from bbtc.export.registry import BUILT_INS, load_exporter
+from tests import profiles
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SOURCES = sorted((REPOSITORY / "bbtc").rglob("*.py"))
@@ -107,6 +109,18 @@ def test_the_page_on_tests_names_every_long_form() -> None:
         if re.search("^from tests.long_form import", text_of(path), re.MULTILINE)
     }
     assert set(re.findall(r"^\| `(tests/[\w/]+\.py)`", page, re.MULTILINE)) == sweeps
+
+
+def test_profiles_alone_decide_how_many_examples_are_drawn() -> None:
+    named = {path.name for path in (REPOSITORY / "tests").rglob("*.py") if "max_examples" in text_of(path)}
+    assert named == {"profiles.py", Path(__file__).name}
+    try:
+        settings.load_profile("explore")
+        assert profiles.examples(60).max_examples == 600
+        settings.load_profile("steady")
+        assert profiles.examples(60).max_examples == 60
+    finally:
+        profiles.load()
 
 
 # --- commands --------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from fractions import Fraction
 from xml.etree import ElementTree as ET
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.diagnostics import BbtcError
 from bbtc.export.btcpp_names import RESERVED
@@ -23,6 +23,7 @@ from bbtc.replay.script import TIMINGS, Run, Script
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from tests import btcpp_nodes
 from tests.conftest import Golden
+from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import STATUS, random_run, value_of, varied_runs
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
@@ -250,7 +251,7 @@ def test_random_trees_keep_the_rules_of_the_engine(seed: int) -> None:
     assert export(tree) == text
 
 
-@settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
+@examples(60)
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_neither_break_the_file_nor_change_what_it_does(tree: Tree) -> None:
     pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")

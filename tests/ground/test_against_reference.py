@@ -8,7 +8,7 @@ from fractions import Fraction
 from math import prod
 from unittest.mock import patch
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import BbtcError, Report
@@ -23,12 +23,11 @@ from bbtc.model.domain import Model
 from tests.ground import reference
 from tests.ground.examples import model_of
 from tests.ground.lifted_texts import lifted_texts
+from tests.profiles import examples
 
 Change = frozenset[tuple[int, Truth]]
 _MOST_COMBINATIONS = 500
-_SETTINGS = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
-)
+_SETTINGS = examples(60)
 
 
 _BOUNDS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
@@ -20,10 +20,11 @@ from bbtc.plan.value_best import best_known
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases, public
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
-MANY = amount(100, 5000)
+MANY = examples(amount(100, 5000))
 """Random tasks of one kind."""
 
 
@@ -34,10 +35,7 @@ def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("small_steps")
-@settings(
-    max_examples=MANY,
-    suppress_health_check=[*HealthCheck],
-)
+@MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> None:
     known = reachability(explore_space(of, Limits()), Limits()).initial.exact
@@ -50,7 +48,7 @@ def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> N
 
 
 @pytest.mark.usefixtures("small_steps")
-@settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
+@MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
     known = reachability(explore_space(of, Limits()), Limits()).initial.exact
@@ -64,7 +62,7 @@ def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
     assert (told.lower >= target) == (known >= target) or told.upper - told.lower < 1e-9
 
 
-@settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
+@MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_what_the_heuristic_calls_a_dead_end_is_one(of: Task) -> None:
     space = explore_space(of, Limits())

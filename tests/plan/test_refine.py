@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
@@ -21,6 +21,7 @@ from bbtc.plan.result import Plan
 from bbtc.tree.nodes import ActionNode, walk
 from bbtc.tree.validate import check_tree
 from tests.ground.examples import task_of
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -156,7 +157,7 @@ def test_a_limit_ends_planning_with_the_best_tree_so_far(limits: dict[str, int],
     assert 0 < done.tree.success_probability < Fraction("0.9")
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(of=tasks(), target=st.sampled_from(["0.5", "0.9", "1"]))
 def test_every_plan_of_a_random_task_ends_soundly(of: Task, target: str) -> None:
     done = plan(of, target, nodes=120, states=3000)

@@ -6,7 +6,7 @@ import dataclasses
 from fractions import Fraction
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.state import Values, compile_action, initial_belief
@@ -17,6 +17,7 @@ from bbtc.limits import Limits
 from bbtc.plan import space_actions, space_packing
 from bbtc.plan.space import StateSpace, explore_space
 from bbtc.plan.space_table import StateTable
+from tests.profiles import examples
 from tests.strategies import tasks
 
 Step = tuple[str, Values, Fraction, Fraction]
@@ -62,7 +63,7 @@ def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
     return found
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(300)
 @given(task=tasks(nested=2))
 def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> None:
     space = explore_space(task, Limits())
@@ -75,7 +76,7 @@ def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> Non
         assert holds == (evaluate(task.goal, values) is Truth.TRUE)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(100)
 @given(task=tasks(nested=2))
 def test_actions_with_very_many_outcomes_and_disjuncts_take_another_way_to_the_same(task: Task) -> None:
     before = space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES
@@ -130,7 +131,7 @@ def test_a_limit_leaves_the_rest_unexpanded_and_is_named() -> None:
     assert "3 states" in space.stop.message
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     rows=st.lists(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), max_size=40), max_size=20),
     bits=st.sampled_from([0, 3, 62]),

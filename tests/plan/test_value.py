@@ -7,7 +7,7 @@ import time
 from fractions import Fraction
 
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given
 
 from bbtc.belief.state import Values
 from bbtc.diagnostics import BbtcError, LimitReached
@@ -25,6 +25,7 @@ from bbtc.plan.value_horizon import horizon_values
 from tests.plan.examples import Optimum, cases, corpus_optima
 from tests.plan.test_refine import action, task
 from tests.plan.test_space import by_simulator
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -105,7 +106,7 @@ def after_steps(of: Task, choices: Choices, steps: int) -> dict[Values, Fraction
     return value
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(200)
 @given(of=tasks())
 def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task) -> None:
     """A value that a policy attains and that solves the optimality inequalities is P*."""
@@ -138,7 +139,7 @@ def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task)
     assert solve(rows_of, [wins[s] for s in positive]) == [values[s] for s in positive]
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(100)
 @given(of=tasks())
 def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Task) -> None:
     choices = choices_of(of)
@@ -154,7 +155,7 @@ def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Ta
     assert within.initial[8].lower <= best
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(60)
 @given(of=tasks())
 def test_bounds_from_floats_hold_the_exact_values(of: Task, monkeypatch: pytest.MonkeyPatch) -> None:
     exact = solved(of)
@@ -174,7 +175,7 @@ def test_bounds_from_floats_hold_the_exact_values(of: Task, monkeypatch: pytest.
             assert b.lower <= a.lower <= b.upper
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(100)
 @given(of=tasks())
 def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
     whole = explore_space(of, Limits())
@@ -186,7 +187,7 @@ def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
         assert bounds.lower <= known <= bounds.upper
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(of=tasks())
 def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
     found = solved(of)
