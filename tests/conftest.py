@@ -89,12 +89,6 @@ def repository() -> Path:
     return REPOSITORY
 
 
-def shared_folder() -> Path | None:
-    """The folder of shared inputs beside the repository, if it is there."""
-    folder = REPOSITORY.parent / "shared"
-    return folder if folder.is_dir() else None
-
-
 def corpus_folder() -> Path | None:
     """The corpus of public planning files: ``$BBTC_CORPUS``, or ``corpus`` in the shared folder."""
     named = os.environ.get("BBTC_CORPUS")
