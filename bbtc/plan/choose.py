@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeAlias
 
 from bbtc.belief.state import State, Transition, Values, compile_action
 from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
@@ -23,6 +24,9 @@ OPEN_SHARE = Fraction(1, 2)
 
 UNMET_DISCOUNT = Fraction(4, 5)
 """A candidate's score is multiplied by this for every precondition that does not hold yet."""
+
+
+_Tried: TypeAlias = tuple[frozenset[Condition], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +87,7 @@ class Chooser:
         self.reachability = RelaxedReachability(task, limits)
         self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
-        self._helps: dict[tuple[Subgoal, int, Truth, Values, frozenset[str]], bool] = {}
+        self._helps: dict[tuple[Subgoal, _Tried, Truth, Values, frozenset[str]], bool] = {}
         doings: list[Doing] = [*task.actions, *task.templates]
         for doing in doings:
             for fact in sorted({fact for effect in effects_of(doing.factors) for fact in effect.sets}):
@@ -92,8 +96,7 @@ class Chooser:
     def helps(self, target: Target) -> bool:
         """Is there any candidate for a target of one state?"""
         ((state, _),) = target.states
-        attempts = len(target.subgoal.sensing) + len(target.subgoal.acting)
-        key = (target.subgoal, attempts, target.value, state.values, target.excluded)
+        key = (target.subgoal, tried_parts(target.subgoal), target.value, state.values, target.excluded)
         if key not in self._helps:
             self._helps[key] = bool(self.candidates(target))
         return self._helps[key]
@@ -204,13 +207,18 @@ class Chooser:
             parts = (goal,)
         else:
             return
-        tried = [frozenset(p.condition for p in a.preconditions) for a in target.subgoal.attempts()]
+        tried = tried_parts(target.subgoal)
         for part in parts:
             conditions = conjuncts(part)
             states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
             if states and frozenset(conditions) not in tried:
                 share = sum((p for _, p in states), Fraction(0)) / target.probability
                 yield Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
+
+
+def tried_parts(subgoal: Subgoal) -> _Tried:
+    """What each attempt at a subgoal asks for first: what was tried is not tried again."""
+    return tuple(frozenset(p.condition for p in attempt.preconditions) for attempt in subgoal.attempts())
 
 
 def circular(condition: Condition, goal: Condition, value: Truth) -> bool:
