@@ -6,10 +6,11 @@ import json
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.cli.program import bbtc
 
 REPOSITORY = Path(__file__).parents[2]
 HOUSEHOLD = REPOSITORY / "domains" / "household"
@@ -17,22 +18,6 @@ DOMAIN = (HOUSEHOLD / "domain.pddl").read_text()
 PROBLEM = (HOUSEHOLD / "look-for-soda.pddl").read_text()
 
 HOSTILE = 'a"); import os #'
-
-
-def bbtc(*arguments: str, folder: Path, stdin: str | bytes | None = None) -> subprocess.CompletedProcess[str]:
-    """Run the command in a folder of its own."""
-    data = stdin.encode() if isinstance(stdin, str) else stdin
-    done = subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", *arguments],
-        cwd=folder,
-        input=data,
-        capture_output=True,
-        check=False,
-        timeout=60,
-    )
-    return subprocess.CompletedProcess(
-        done.args, done.returncode, done.stdout.decode(), done.stderr.decode(errors="replace")
-    )
 
 
 def assert_refused(done: subprocess.CompletedProcess[str], folder: Path, *words: str, place: str = "") -> str:
