@@ -12,31 +12,50 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias, overload
 
 from bbtc.diagnostics import Diagnostic, Report
 from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.source import Reading, SourceFile
+from bbtc.tree import notebook
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from bbtc.backends.exporter import Artefact, Files
     from bbtc.belief.scenarios import Scenario
     from bbtc.belief.simulate import Figures
     from bbtc.belief.stepper import Stepper
-    from bbtc.build.runner import BuildReport
+    from bbtc.builder.runner import BuildReport
     from bbtc.comparison import Comparison
-    from bbtc.export.registry import Artefact
     from bbtc.ground.task import Task
     from bbtc.model.domain import Model
-    from bbtc.plan.bounds import TaskValue
-    from bbtc.plan.options import Retries
-    from bbtc.plan.result import Plan, Refinement
+    from bbtc.planner.bounds import TaskValue
+    from bbtc.planner.options import Retries
+    from bbtc.planner.result import Plan, Refinement
     from bbtc.tree.nodes import Tree
-    from bbtc.verify.verdict import Engine, Verdict
+    from bbtc.verifier.verdict import Engine, Verdict
 
 Source: TypeAlias = "str | os.PathLike[str] | SourceFile"
 """The path of a file, or a text with the name it is shown under."""
+
+TextFormat: TypeAlias = Literal[
+    "btcpp",
+    "btcpp_palette",
+    "dot",
+    "jani",
+    "json",
+    "mermaid",
+    "prism",
+    "py_trees",
+    "py_trees_robot",
+    "svg",
+    "text",
+    "yaml",
+]
+BinaryFormat: TypeAlias = Literal["png"]
+FolderFormat: TypeAlias = Literal["btcpp_project"]
+"""The built-in export formats, by what :func:`export` gives back."""
 
 Probability: TypeAlias = "Fraction | float | str"
 """An exact probability. A float stands for the decimal it prints as: 0.9 is nine tenths."""
@@ -140,8 +159,8 @@ def plan(
     limits allow no tree at all, and ``ValueError`` for a target that is no probability.
     """
     from bbtc import pipeline
-    from bbtc.plan.options import Options
-    from bbtc.plan.strategies import DEFAULT
+    from bbtc.planner.options import Options
+    from bbtc.planner.strategies import DEFAULT
 
     limits = limits or Limits(seconds=PLANNING_SECONDS)
     options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
@@ -162,8 +181,8 @@ def bounds(
     """The best probability that any policy can reach, between an upper and a lower bound; with
     ``costs``, the least expected cost of reaching it so often, too. Limits are as of :func:`plan`, and it
     raises as that does."""
-    from bbtc.plan.bounds import task_value
-    from bbtc.plan.options import Options
+    from bbtc.planner.bounds import task_value
+    from bbtc.planner.options import Options
 
     limits = limits or Limits(seconds=PLANNING_SECONDS)
     task = _task(inputs, limits, report, Reading(problem, lenient))
@@ -266,12 +285,28 @@ def import_tree(
     )
 
 
+@overload
+def export(
+    tree: Source | Tree | Plan, to: TextFormat, *, limits: Limits | None = None, **options: bool | int | str
+) -> str: ...
+@overload
+def export(
+    tree: Source | Tree | Plan, to: BinaryFormat, *, limits: Limits | None = None, **options: bool | int | str
+) -> bytes: ...
+@overload
+def export(
+    tree: Source | Tree | Plan, to: FolderFormat, *, limits: Limits | None = None, **options: bool | int | str
+) -> Files: ...
+@overload
+def export(
+    tree: Source | Tree | Plan, to: str, *, limits: Limits | None = None, **options: bool | int | str
+) -> Artefact: ...
 def export(
     tree: Source | Tree | Plan, to: str, *, limits: Limits | None = None, **options: bool | int | str
 ) -> Artefact:
-    """The tree in an export format: text, or bytes where the format is binary. ``options`` are those
-    that ``bbtc export --list`` shows. Raises :class:`BbtcError` for an unknown format or option and
-    for a tree that the format cannot hold."""
+    """The tree in an export format: text, bytes where the format is binary, or the files of a folder.
+    ``options`` are those that ``bbtc export --list`` shows. Raises :class:`BbtcError` for an unknown format
+    or option and for a tree that the format cannot hold."""
     from bbtc import pipeline
 
     texts = {
@@ -296,7 +331,7 @@ def build(
     """
     from pathlib import Path
 
-    from bbtc.build.runner import build as run
+    from bbtc.builder.runner import build as run
     from bbtc.manifest.find import find_manifest
 
     file = find_manifest(Path()) if manifest is None else Path(manifest)
@@ -306,7 +341,7 @@ def build(
 def init(folder: str | os.PathLike[str] = ".") -> tuple[Path, ...]:
     """Make a small project to start from; the files made. Raises :class:`BbtcError` where one of them is
     there already, and then makes none."""
-    from bbtc.build.starter import make_project
+    from bbtc.builder.starter import make_project
 
     return make_project(folder)
 
@@ -343,7 +378,7 @@ def _task(
 
 
 def _tree(value: Source | Task | Tree | Plan, limits: Limits | None) -> Tree:
-    from bbtc.plan.result import Plan
+    from bbtc.planner.result import Plan
     from bbtc.tree.nodes import Tree
 
     if isinstance(value, Tree):
@@ -359,3 +394,11 @@ def _exact(value: Probability | None) -> Fraction | None:
     from bbtc.artefacts.numbers import parse_probability
 
     return None if value is None else parse_probability(str(value))
+
+
+def _drawn(tree: Tree) -> str:
+    """A tree as a picture for notebooks, laid out by ourselves: the same everywhere."""
+    return export(tree, "svg", layout="bbtc")
+
+
+notebook.register(_drawn)

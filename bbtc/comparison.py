@@ -9,8 +9,8 @@ from typing import Any
 
 from bbtc.artefacts import task_to_json
 from bbtc.artefacts.tree_json import carried
+from bbtc.backends.pictures.outline import label
 from bbtc.belief.simulate import Figures
-from bbtc.export.outline import label
 from bbtc.ground.task import Task
 from bbtc.printable import printable
 from bbtc.tree.difference import Difference, differences

@@ -14,20 +14,20 @@ from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Repor
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
-from bbtc.plan.options import DEFAULTS, Options
+from bbtc.planner.options import DEFAULTS, Options
 from bbtc.rounding import figure_text
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import Status, Tree
 
 if TYPE_CHECKING:
-    from bbtc.artefacts.btcpp_xml import Imported
+    from bbtc.backends.btcpp.reader.xml import Imported
+    from bbtc.backends.exporter import Artefact
     from bbtc.belief.chain import Chain
     from bbtc.belief.simulate import Figures
     from bbtc.comparison import Comparison
-    from bbtc.export.registry import Artefact
-    from bbtc.plan.result import Plan, Progress
-    from bbtc.verify.verdict import Engine, Verdict
+    from bbtc.planner.result import Plan, Progress
+    from bbtc.verifier.verdict import Engine, Verdict
 
 
 _MOST_LISTED = 8  # problems that a hint names
@@ -296,8 +296,8 @@ def import_tree(
     Raises :class:`BbtcError` with everything that cannot be read, or ``LimitReached``.
     """
     from bbtc.artefacts import load_tree
-    from bbtc.artefacts.btcpp_xml import Imported, tree_from_btcpp
     from bbtc.artefacts.kinds import is_artefact, is_xml
+    from bbtc.backends.btcpp.reader.xml import Imported, tree_from_btcpp
 
     if not is_xml(source) and not is_artefact(source):
         load_tree(source)  # tells what it is instead
@@ -384,9 +384,9 @@ def plan_task(
     """
     from bbtc.belief.chain import explore
     from bbtc.belief.soundness import violations
-    from bbtc.plan.best_tree import BestTree
-    from bbtc.plan.bounds import judged
-    from bbtc.plan.strategies import run_strategy
+    from bbtc.planner.best_tree import BestTree
+    from bbtc.planner.bounds import judged
+    from bbtc.planner.strategies import run_strategy
     from bbtc.tree.validate import check_tree
 
     wanted = task.goal_probability if target is None else target
@@ -426,7 +426,7 @@ def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
 
 def process_text(task: Task, form: str) -> str:
     """The task as a Markov decision process, in the format ``prism`` or ``jani``."""
-    from bbtc.export import jani, prism
+    from bbtc.backends.models import jani, prism
 
     return prism.task_text(task) if form == "prism" else jani.task_text(task)
 
@@ -442,7 +442,7 @@ def compare_trees(old: Tree, new: Tree, limits: Limits) -> Comparison:
 def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
     """The figures of a tree, recomputed without the simulator and the planner. Raises
     ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer."""
-    from bbtc.verify.verdict import verify
+    from bbtc.verifier.verdict import verify
 
     return verify(tree, limits, engine)
 
@@ -451,7 +451,7 @@ def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limit
     """The tree in an export format, the same whether it was just planned or read from a file. Raises
     :class:`BbtcError` for an unknown format or option and for a tree the format cannot hold."""
     from bbtc.artefacts.tree_json import carried
-    from bbtc.export.registry import load_exporter, parse_options, run_exporter
+    from bbtc.backends.registry import load_exporter, parse_options, run_exporter
 
     tree = carried(tree)
     exporter = load_exporter(form)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from bbtc.build.job import Made
+    from bbtc.builder.job import Made
     from bbtc.manifest.read import Manifest, TreeEntry
 
 
@@ -75,7 +75,7 @@ class TreeTests(pytest.Collector):
     def made(self) -> Made:
         """The tree, planned once, without its exports."""
         if self._made is None:
-            from bbtc.build.runner import make_tree
+            from bbtc.builder.runner import make_tree
 
             self._made = make_tree(self.manifest, self.entry)
         return self._made
@@ -92,13 +92,13 @@ class TreeTests(pytest.Collector):
             )
 
     def _figures(self) -> None:
-        from bbtc.build.runner import complaints
+        from bbtc.builder.runner import complaints
 
         made = self.made()
         _fail_with([*made.diagnostics, *complaints(self.entry, made)] if made.failure else [])
 
     def _files(self) -> None:
-        from bbtc.build.runner import build
+        from bbtc.builder.runner import build
 
         update = bool(self.config.getoption("--bbtc-update"))
         report = build(self.manifest.file, names=[self.entry.name], jobs=1, check=not update)
@@ -106,7 +106,7 @@ class TreeTests(pytest.Collector):
 
     def _same(self, form: str) -> None:
         from bbtc.artefacts import load_tree
-        from bbtc.build.job import TREE
+        from bbtc.builder.job import TREE
         from bbtc.limits import Limits
         from bbtc.replay.equivalence import difference, engine_missing
         from bbtc.source import SourceFile
@@ -174,7 +174,7 @@ class Golden:
     def __call__(self, file: str | Path, content: str | bytes) -> None:
         """Fail, with a diff, unless the file has this content; with ``--bbtc-update``, write it."""
         from bbtc.diagnostics import BbtcError
-        from bbtc.files import write
+        from bbtc.files.read_write import write
 
         path = Path(file)
         if self.update:

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from bbtc.backends.registry import BUILT_INS, load_exporter
 from bbtc.codes import CODES
-from bbtc.export.registry import BUILT_INS, load_exporter
 from tests import profiles
 
 REPOSITORY = Path(__file__).resolve().parent.parent
@@ -179,7 +179,7 @@ def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel: Path) -> N
     assert {top for top in tops if not top.endswith((".dist-info", ".data"))} == {"bbtc"}
     shared = {name.partition(".data/data/")[2] for name in names if ".data/" in name}
     assert {name.rpartition("/")[0] for name in shared} == {"share/cmake/bbtc"}
-    assert {"bbtc/build/template/bbtc.yaml", "bbtc/cmake/bbtcConfig.cmake"} <= names
+    assert {"bbtc/builder/template/bbtc.yaml", "bbtc/cmake/bbtcConfig.cmake"} <= names
 
 
 def test_an_installed_wheel_reads_a_domain(wheel: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing_extensions import assert_never
 from bbtc.analysis.formulas import effect, formula, inner_scope
 from bbtc.analysis.names import Names, Scope
 from bbtc.diagnostics import Related, Report
-from bbtc.graph import components
+from bbtc.markov import components
 from bbtc.model import domain as md
 from bbtc.model import formula as mf
 from bbtc.syntax import ast

@@ -13,7 +13,7 @@ from bbtc.belief.simulate import Figures
 from bbtc.belief.state import Values
 from bbtc.belief.tick import Status
 from bbtc.kleene import Truth
-from bbtc.plan.failing_runs import FailingRun
+from bbtc.planner.failing_runs import FailingRun
 from bbtc.tree.nodes import Tree
 
 

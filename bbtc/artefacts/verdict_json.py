@@ -6,8 +6,8 @@ from fractions import Fraction
 from typing import Any
 
 from bbtc.artefacts.numbers import figure_text
-from bbtc.verify.solve import Recomputed
-from bbtc.verify.verdict import StormFigures, Verdict
+from bbtc.verifier.solve import Recomputed
+from bbtc.verifier.verdict import StormFigures, Verdict
 
 _FIGURES = (
     "success",

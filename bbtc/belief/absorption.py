@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from bbtc.belief.chain import Chain
-from bbtc.graph import components
+from bbtc.markov import components
 
 _ZERO = Fraction(0)
 _ONE = Fraction(1)

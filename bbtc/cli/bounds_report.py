@@ -10,8 +10,8 @@ from bbtc.artefacts.numbers import figure_text
 from bbtc.cli.wording import at, block_line, counted, exact, oneof_note, steps_of, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
-from bbtc.plan.bounds import TaskValue
-from bbtc.plan.why_not import DeadEnd
+from bbtc.planner.bounds import TaskValue
+from bbtc.planner.why_not import DeadEnd
 from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from bbtc.backends.pictures.outline import UNICODE, label, outline
 from bbtc.cli.wording import counted, exact
 from bbtc.comparison import Comparison, FigureChange
-from bbtc.export.outline import UNICODE, label, outline
 from bbtc.printable import printable
 from bbtc.rounding import decimal
 from bbtc.tree.difference import Difference, counts

@@ -8,10 +8,10 @@ import sys
 
 import click
 
-from bbtc.cli.commands import cli
+from bbtc.cli.group import cli
 from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERNAL, EXIT_INTERRUPTED
 from bbtc.cli.output import tell
-from bbtc.files import system_trouble
+from bbtc.files.read_write import system_trouble
 from bbtc.printable import printable
 from bbtc.watch import process_started
 

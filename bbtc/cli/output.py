@@ -11,7 +11,7 @@ from typing import TextIO
 
 import click
 
-from bbtc.files import cannot_write
+from bbtc.files.read_write import cannot_write
 from bbtc.limits import Stage
 from bbtc.printable import printable
 

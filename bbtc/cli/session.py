@@ -20,7 +20,7 @@ from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine, on_terminal, tell
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report, Severity
-from bbtc.files import Outputs, read_file, reason, require_apart, require_writable
+from bbtc.files.read_write import Outputs, read_file, reason, require_apart, require_writable
 from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.printable import printable
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
@@ -28,7 +28,7 @@ from bbtc.tree.deep import stack_room
 from bbtc.watch import Watch, watching
 
 if TYPE_CHECKING:
-    from bbtc.export.registry import Artefact
+    from bbtc.backends.exporter import Artefact
 
 _Text = TypeVar("_Text", str, bytes, str | bytes)
 
@@ -118,7 +118,7 @@ class Session:
 
     def _places(self, texts: Mapping[str, _Text], folder: str, *, check: bool) -> dict[str, _Text]:
         """The texts by where they go: not over what was begun here before, which is somebody's by now."""
-        from bbtc.export.registry import Begun
+        from bbtc.backends.exporter import Begun
 
         found: dict[str, _Text] = {}
         kept: list[str] = []
@@ -127,7 +127,7 @@ class Session:
             if not isinstance(text, Begun) or name == "-" or not path.is_file():
                 found[name] = text
                 continue
-            from bbtc.export.begun import place_of
+            from bbtc.backends.begun import place_of
 
             try:
                 old = read_file(path, self.limits.file_bytes)
@@ -156,7 +156,7 @@ class Session:
 
 
 def _rule(output: str, inputs: Sequence[str]) -> bytes:
-    from bbtc.depfile import depfile
+    from bbtc.files.depfile import depfile
 
     return depfile(output, inputs)
 

@@ -14,9 +14,9 @@ from bbtc.ground.condition import Condition
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
-from bbtc.plan.failing_runs import FailingRun
-from bbtc.plan.result import Plan, Refinement
-from bbtc.plan.why_not import Block
+from bbtc.planner.failing_runs import FailingRun
+from bbtc.planner.result import Plan, Refinement
+from bbtc.planner.why_not import Block
 from bbtc.printable import printable
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree, retries_of, walk

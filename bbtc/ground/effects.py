@@ -10,11 +10,11 @@ from itertools import repeat
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
-from bbtc.ground.atoms import Atoms, Scope
-from bbtc.ground.bulk import Shared
 from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
 from bbtc.ground.normal import Block, Chance, free, groups, reads
+from bbtc.ground.reachability.atoms import Atoms, Scope
+from bbtc.ground.reachability.bulk import Shared
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
 from bbtc.ground.task import ONE, ZERO, Charge, Effect, Factor, Outcome, outcomes_of
 from bbtc.ground.universe import Row

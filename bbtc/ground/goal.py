@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Diagnostic, Related, Report, Severity
-from bbtc.ground.atoms import Atoms
 from bbtc.ground.lower import Lowering
 from bbtc.ground.missing import Fact, Lack, Missing, NoneTogether, NoObject, Search
 from bbtc.ground.normal import conjuncts
-from bbtc.ground.reach import Reach, reach
+from bbtc.ground.reachability.atoms import Atoms
+from bbtc.ground.reachability.reach import Reach, reach
 from bbtc.ground.refused import refused
 from bbtc.ground.start import beginning
 from bbtc.ground.task import ground_name

@@ -12,20 +12,20 @@ from typing_extensions import assert_never
 from bbtc.collector import collector_paused
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
-from bbtc.ground.atoms import Atoms
-from bbtc.ground.bulk import consumed, instances
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
 from bbtc.ground.effects import EffectLowering, LoweredEffect
 from bbtc.ground.goal import unreachable
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normalise
 from bbtc.ground.prune import prune, reordered
-from bbtc.ground.reach import Reach, reach
+from bbtc.ground.reachability.atoms import Atoms
+from bbtc.ground.reachability.bulk import consumed, instances
+from bbtc.ground.reachability.reach import Reach, reach
+from bbtc.ground.reachability.usage import called
 from bbtc.ground.refused import refused
 from bbtc.ground.relevance import Relevance
 from bbtc.ground.start import Beginning, beginning
 from bbtc.ground.universe import Row
-from bbtc.ground.usage import called
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.model import domain as md

@@ -10,8 +10,6 @@ from typing import Any
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import BbtcError
-from bbtc.ground.atoms import Atoms, Leaves, OpenLeaves, Scope
-from bbtc.ground.bulk import Shared, instances, picker
 from bbtc.ground.condition import (
     FALSE,
     TRUE,
@@ -26,6 +24,8 @@ from bbtc.ground.condition import (
     negation,
 )
 from bbtc.ground.normal import conjuncts, disjuncts, free, normal_form
+from bbtc.ground.reachability.atoms import Atoms, Leaves, OpenLeaves, Scope
+from bbtc.ground.reachability.bulk import Shared, instances, picker
 from bbtc.ground.universe import Row, Universe
 from bbtc.kleene import Truth
 from bbtc.limits import Limits

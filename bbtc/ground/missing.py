@@ -13,8 +13,8 @@ from typing import TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.ground.normal import conjuncts, normal_form
-from bbtc.ground.program import all_groups
-from bbtc.ground.reach import Reach
+from bbtc.ground.reachability.program import all_groups
+from bbtc.ground.reachability.reach import Reach
 from bbtc.ground.repair import Need, Repairs, Root, Some, Way, every, some
 from bbtc.kleene import Truth
 from bbtc.limits import Limits

@@ -11,12 +11,12 @@ from itertools import chain, compress
 from operator import not_
 
 from bbtc.diagnostics import Report
-from bbtc.ground.atoms import Atoms
-from bbtc.ground.bulk import chunks, picker
 from bbtc.ground.condition import Condition, variables
 from bbtc.ground.effects import EffectLowering
 from bbtc.ground.lower import Frame, Lowering, projection
 from bbtc.ground.normal import conjuncts, normal_form, reads
+from bbtc.ground.reachability.atoms import Atoms
+from bbtc.ground.reachability.bulk import chunks, picker
 from bbtc.ground.universe import Row
 from bbtc.limits import Limits
 from bbtc.model import domain as md

@@ -142,6 +142,7 @@ class Repairs(Generic[F]):
         todo: list[tuple[Need[F], str | None, F | None]] = [(need, None, None)]
         needed_by: dict[F, str | None] = {}
         for each, by, parent in todo:  # grows while it is read: breadth first
+            self._limits.check_time("the search for what is missing")
             if isinstance(each, Every):
                 todo.extend((part, by, parent) for part in each.parts)
                 continue

@@ -9,9 +9,9 @@ from itertools import combinations, pairwise, repeat
 from operator import eq, lt
 from typing import TypeAlias, cast
 
-from bbtc.ground.atoms import Pair
-from bbtc.ground.bulk import instances
 from bbtc.ground.lower import Env, Frame, Lowering
+from bbtc.ground.reachability.atoms import Pair
+from bbtc.ground.reachability.bulk import instances
 from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth

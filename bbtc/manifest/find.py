@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError
-from bbtc.files import read_file, reason
+from bbtc.files.read_write import read_file, reason
 
 YAML_NAME = "bbtc.yaml"
 TOML_NAME = "pyproject.toml"

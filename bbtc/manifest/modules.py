@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING
 
-from bbtc.export.names import module_name
-from bbtc.export.pytrees import py_trees
-from bbtc.export.pytrees_robot import MODULE, is_module, py_trees_robot
+from bbtc.backends.names import module_name
+from bbtc.backends.pytrees.exporter import py_trees
+from bbtc.backends.pytrees.robot import MODULE, is_module, py_trees_robot
 
 if TYPE_CHECKING:
     from bbtc.manifest.read import Export

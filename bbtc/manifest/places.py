@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bbtc.artefacts.cursor import At, Fault
-from bbtc.export.begun import BESIDE
-from bbtc.files import KEPT, ignores_case
+from bbtc.backends.begun import BESIDE
+from bbtc.files.read_write import KEPT, ignores_case
 from bbtc.manifest.find import TOML_NAME, YAML_NAME
 
 

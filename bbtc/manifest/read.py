@@ -11,14 +11,15 @@ from typing import TypeVar, cast
 
 from bbtc.artefacts.cursor import At, Fault, Faults, Stop, clip, run_reader
 from bbtc.artefacts.numbers import parse_probability
+from bbtc.backends.exporter import Exporter
+from bbtc.backends.registry import load_exporter, parse_options
 from bbtc.diagnostics import BbtcError
-from bbtc.export.registry import Exporter, load_exporter, parse_options
 from bbtc.manifest import modules
 from bbtc.manifest.expectations import Expectation, parse_expectation
 from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
 from bbtc.manifest.places import Places
-from bbtc.plan.options import Retries
-from bbtc.plan.strategies import DEFAULT, STRATEGIES
+from bbtc.planner.options import Retries
+from bbtc.planner.strategies import DEFAULT, STRATEGIES
 from bbtc.printable import printable
 from bbtc.source import AS_WRITTEN, Reading, Span
 from bbtc.syntax.reader import decode_source

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Literal, Protocol
 from xml.etree import ElementTree as ET
 
-from bbtc.export.btcpp import btcpp
-from bbtc.export.btcpp_names import BtcppNames, btcpp_names
-from bbtc.export.names import Symbol
-from bbtc.export.pytrees import py_trees, py_trees_names
+from bbtc.backends.btcpp.exporter import btcpp
+from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
+from bbtc.backends.names import Symbol
+from bbtc.backends.pytrees.exporter import py_trees, py_trees_names
 from bbtc.ground.task import Task, ground_name
 from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing, World
 from bbtc.replay.ticks import Tick, TickScript, TickWorld

@@ -7,7 +7,7 @@ import re
 import sys
 
 from bbtc.diagnostics import BbtcError
-from bbtc.files import read_file, read_stream, reason
+from bbtc.files.read_write import read_file, read_stream, reason
 from bbtc.source import SourceFile, Span
 
 MAX_BYTES = 64 * 1024 * 1024

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from importlib import import_module
 from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
+from bbtc.tree.notebook import picture
 
 ControlKind: TypeAlias = Literal["sequence", "fallback", "skipper", "retry"]
 
@@ -89,11 +89,9 @@ class Tree:
     status: Status
     bounds: tuple[Fraction, Fraction] | None = None
 
-    def _repr_svg_(self) -> str:
-        """The tree as a picture, for notebooks; laid out by ourselves, so that it is the same everywhere."""
-        # Drawing is a later stage, which this one does not know: it is looked up by name.
-        picture: str = import_module("bbtc.api").export(self, "svg", layout="bbtc")
-        return picture
+    def _repr_svg_(self) -> str | None:
+        """The tree as a picture, for notebooks."""
+        return picture(self)
 
 
 def walk(node: Node) -> Iterator[Node]:

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import bbtc
-from bbtc.cli.commands import cli
+from bbtc.cli.group import cli
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.source import SourceFile
 from tests.domains.lifted import Lifted

@@ -11,7 +11,7 @@ import pytest
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, format_source, plan_task
-from bbtc.plan.bounds import task_value
+from bbtc.planner.bounds import task_value
 from bbtc.source import SourceFile
 from bbtc.syntax.hints import keywords
 from bbtc.syntax.tables import tables

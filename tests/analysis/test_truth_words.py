@@ -10,7 +10,7 @@ from bbtc.analysis.check import check
 from bbtc.diagnostics import BbtcError, Report, Severity
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, format_source
-from bbtc.plan.bounds import task_value
+from bbtc.planner.bounds import task_value
 from bbtc.source import SourceFile
 from tests.ground.examples import model_of
 

@@ -59,7 +59,7 @@ def test_listing_and_sampling_end_at_the_limit() -> None:
 
 
 def test_sampled_runs_end_as_often_as_they_do() -> None:
-    """A toss that is won, lost, or followed by waiting without end, which is cut off; 4 standard deviations."""
+    """A toss that is won, lost, or followed by waiting without end, which is cut off (within 4 sigma)."""
     toss = action("toss", TRUE, ("1/2", {0: T}), ("1/4", {}), ("1/4", {1: T}))
     of = two_facts(toss, action("wait", Is(1, T), ("1", {})))
     waiting = ControlNode(

@@ -14,7 +14,7 @@ from pathlib import Path
 from bbtc.diagnostics import Report
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources
-from bbtc.plan.refine import refine
+from bbtc.planner.chaining.refine import refine
 from bbtc.syntax.reader import read_source
 
 DOMAIN = Path(__file__).parents[2] / "domains" / "household"

@@ -18,7 +18,7 @@ from types import ModuleType
 from bbtc.diagnostics import Report
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
-from bbtc.plan.simplify import size
+from bbtc.rewrite.simplify import size
 from bbtc.source import SourceFile
 from bbtc.syntax.reader import read_source
 

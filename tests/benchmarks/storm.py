@@ -39,8 +39,8 @@ def ours(domain: Path, problem: Path) -> dict[str, Any]:
     from bbtc.diagnostics import Report
     from bbtc.limits import Limits
     from bbtc.pipeline import compile_sources
-    from bbtc.plan.space import explore_space
-    from bbtc.plan.value import reachability
+    from bbtc.planner.mdp.explore import explore_space
+    from bbtc.planner.mdp.maxprob import reachability
     from bbtc.syntax.reader import read_source
 
     task = compile_sources([read_source(str(domain)), read_source(str(problem))], Report(), Limits())
@@ -78,9 +78,9 @@ def write_program(domain: Path, problem: Path, path: Path) -> None:
     from bbtc.limits import Limits
     from bbtc.pipeline import compile_sources
     from bbtc.syntax.reader import read_source
-    from bbtc.verify.naming import numbered
-    from bbtc.verify.prism import prism_text
-    from bbtc.verify.process import process_of
+    from bbtc.verifier.naming import numbered
+    from bbtc.verifier.prism import prism_text
+    from bbtc.verifier.process import process_of
 
     task = compile_sources([read_source(str(domain)), read_source(str(problem))], Report(), Limits())
     program = process_of(task)

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from bbtc.build.runner import build
-from bbtc.export.begun import interface_changes
-from bbtc.export.btcpp_project import btcpp_project
+from bbtc.backends.begun import interface_changes
+from bbtc.backends.btcpp.project import btcpp_project
+from bbtc.builder.runner import build
 from tests.build.projects import REPOSITORY, bbtc, project, snapshot
 from tests.strategies import soda_tree
 

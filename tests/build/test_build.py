@@ -18,9 +18,9 @@ from typing import Any
 import pytest
 
 from bbtc import pipeline
-from bbtc.build import pool, runner, state
-from bbtc.build.job import Job
-from bbtc.build.runner import BuildReport, build
+from bbtc.builder import pool, runner, state
+from bbtc.builder.job import Job
+from bbtc.builder.runner import BuildReport, build
 from bbtc.manifest.read import TreeEntry
 from tests.build.projects import COIN, REPOSITORY, bbtc, project, several, snapshot
 
@@ -70,14 +70,15 @@ def test_a_build_makes_what_the_commands_make(tmp_path: Path) -> None:
 def test_a_format_of_several_files_goes_into_a_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bbtc.export import registry
+    from bbtc.backends import registry
+    from bbtc.backends.exporter import Files
 
     class Several:
         name, description, suffix, options = "several", "for tests", "", ()
 
-        def export(self, tree: object, options: object, figures: object) -> registry.Files:
+        def export(self, tree: object, options: object, figures: object) -> Files:
             """Two files."""
-            return registry.Files({"a.txt": "a\n", "sub/b.txt": "b\n"})
+            return Files({"a.txt": "a\n", "sub/b.txt": "b\n"})
 
     original = registry.load_exporter
     for module in (registry, sys.modules["bbtc.manifest.read"]):
@@ -124,9 +125,9 @@ def test_up_to_date_needs_no_manifest_parser_and_no_stage(tmp_path: Path) -> Non
     folder = several(tmp_path, 2)
     run(folder)
     code = (
-        "import sys; from pathlib import Path; from bbtc.build.runner import build\n"
+        "import sys; from pathlib import Path; from bbtc.builder.runner import build\n"
         "assert build(Path('bbtc.yaml')).count('unchanged') == 2\n"
-        "heavy = ('yaml', 'lark', 'clingo', 'numpy', 'bbtc.pipeline', 'bbtc.export', 'bbtc.plan')\n"
+        "heavy = ('yaml', 'lark', 'clingo', 'numpy', 'bbtc.pipeline', 'bbtc.backends', 'bbtc.planner')\n"
         "print([name for name in heavy if name in sys.modules])\n"
     )
     done = subprocess.run(

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from bbtc.build.runner import build
+from bbtc.builder.runner import build
 from tests.build.projects import REPOSITORY, bbtc, several
 from tests.long_form import amount
 

@@ -17,7 +17,7 @@ from bbtc.diagnostics import BbtcError
 from bbtc.manifest.expectations import FIGURES
 from bbtc.manifest.find import find_manifest
 from bbtc.manifest.read import Manifest, read_manifest
-from bbtc.plan.strategies import DEFAULT, STRATEGIES
+from bbtc.planner.strategies import DEFAULT, STRATEGIES
 
 REPOSITORY = Path(__file__).parents[2]
 SCHEMA: dict[str, Any] = json.loads((REPOSITORY / "docs" / "schemas" / "bbtc-manifest-1.json").read_text())
@@ -253,7 +253,7 @@ def test_no_alias_makes_reading_long(kind: str) -> None:
 
 
 def test_a_manifest_that_is_too_large_is_refused(tmp_path: Path) -> None:
-    from bbtc.build.runner import build
+    from bbtc.builder.runner import build
 
     (tmp_path / "bbtc.yaml").write_bytes(b"#" * (1 << 20) + b"\n")
     with pytest.raises(BbtcError, match="BBT0005"):
@@ -286,7 +286,7 @@ def instance(text: str) -> Any:
 
 def test_the_schema_takes_what_we_take() -> None:
     Draft202012Validator.check_schema(SCHEMA)
-    for text in (FULL, BASE, (REPOSITORY / "bbtc/build/template/bbtc.yaml").read_text()):
+    for text in (FULL, BASE, (REPOSITORY / "bbtc/builder/template/bbtc.yaml").read_text()):
         assert list(Draft202012Validator(SCHEMA).iter_errors(instance(text))) == []
 
 

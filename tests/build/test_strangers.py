@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from bbtc import folder as folders
-from bbtc.build.runner import BuildReport, build
+from bbtc.builder.runner import BuildReport, build
 from bbtc.diagnostics import BbtcError
+from bbtc.files import folder as folders
 from tests.build.projects import COIN, bbtc, project, snapshot
 
 MANIFEST = "trees: {c: {domain: c.pddl, target: 0.5, exports: [dot]}}\n"

@@ -125,7 +125,7 @@ def corridor(count: int) -> str:
 
 
 def formats() -> list[str]:
-    from bbtc.export.registry import BUILT_INS
+    from bbtc.backends.registry import BUILT_INS
 
     return list(BUILT_INS)
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft4Validator, FormatChecker
 
-from bbtc.cli.commands import COMMANDS
+from bbtc.cli.group import COMMANDS
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import Diagnostic, Related, Severity
 from bbtc.source import SourceFile, Span

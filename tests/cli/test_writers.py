@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from bbtc.folder import TEMPORARY
+from bbtc.files.folder import TEMPORARY
 from tests.build.projects import COIN
 from tests.cli.forked import Commands, commands
 

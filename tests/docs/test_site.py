@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import pytest
 
-from bbtc.cli.commands import COMMANDS, cli
+from bbtc.cli.group import COMMANDS, cli
 
 REPOSITORY = Path(__file__).parents[2]
 REFERENCE = REPOSITORY / "docs" / "command-reference.md"

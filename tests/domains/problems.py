@@ -13,12 +13,12 @@ from typing import Any
 
 from click.testing import CliRunner
 
-from bbtc.cli.commands import cli
+from bbtc.cli.group import cli
 from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
-from bbtc.plan.result import Plan
+from bbtc.planner.result import Plan
 from bbtc.syntax.reader import read_source
 
 REPOSITORY = Path(__file__).resolve().parents[2]

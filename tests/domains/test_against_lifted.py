@@ -11,8 +11,8 @@ from bbtc.diagnostics import BbtcError, LimitReached, Report, Severity
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task, simulate_tree
-from bbtc.plan.bounds import task_value
-from bbtc.plan.options import Options
+from bbtc.planner.bounds import task_value
+from bbtc.planner.options import Options
 from bbtc.source import SourceFile
 from tests.domains.lifted import Lifted, TooLarge
 from tests.domains.lifted_tree import Endless, TreeOnText

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 import bbtc
-from bbtc.cli.commands import cli
+from bbtc.cli.group import cli
 from bbtc.diagnostics import Severity
 from bbtc.source import SourceFile
 

@@ -8,7 +8,7 @@ from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
-from bbtc.plan.simplify import size
+from bbtc.rewrite.simplify import size
 from bbtc.source import SourceFile
 from bbtc.syntax.reader import read_source
 from tests.benchmarks.service_robot import FOLDER, generator

@@ -11,10 +11,10 @@ from xml.etree import ElementTree as ET
 import pytest
 from hypothesis import given
 
+from bbtc.backends.btcpp.names import RESERVED
+from bbtc.backends.registry import load_exporter, parse_options
+from bbtc.backends.shape import DEEPEST_CONDITION, DEEPEST_TREE
 from bbtc.diagnostics import BbtcError
-from bbtc.export.btcpp_names import RESERVED
-from bbtc.export.registry import load_exporter, parse_options
-from bbtc.export.shape import DEEPEST_CONDITION, DEEPEST_TREE
 from bbtc.ground.condition import TRUE, And, Condition, Is, Known, Not, Or
 from bbtc.ground.task import GroundAction, InitialState, Task, Variable
 from bbtc.kleene import Truth

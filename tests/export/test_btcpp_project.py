@@ -16,10 +16,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bbtc.export import cppcode
-from bbtc.export.btcpp_project import btcpp_project
-from bbtc.export.interface import action_symbol
-from bbtc.export.world_model import actions_used
+from bbtc.backends.btcpp import cppcode
+from bbtc.backends.btcpp.project import btcpp_project
+from bbtc.backends.interface import action_symbol
+from bbtc.backends.world_model import actions_used
 from bbtc.ground.condition import TRUE, And, Is, Known
 from bbtc.ground.task import (
     Effect,

@@ -12,8 +12,8 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from bbtc.export.btcpp import btcpp
-from bbtc.export.btcpp_palette import btcpp_palette
+from bbtc.backends.btcpp.exporter import btcpp
+from bbtc.backends.btcpp.palette import btcpp_palette
 from bbtc.tree.nodes import Tree
 from tests.btcpp_nodes import faults, registered
 from tests.domains.problems import PROBLEMS, Problem, plan_of

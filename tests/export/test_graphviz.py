@@ -19,10 +19,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bbtc.backends.pictures.diagram import diagram, flow_text, wrap
+from bbtc.backends.pictures.layout import Box, tidy
+from bbtc.backends.registry import load_exporter, parse_options
 from bbtc.diagnostics import BbtcError
-from bbtc.export.diagram import diagram, flow_text, wrap
-from bbtc.export.registry import load_exporter, parse_options
-from bbtc.export.svg_layout import Box, tidy
 from bbtc.ground.condition import Is
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
@@ -374,7 +374,7 @@ def test_a_very_deep_tree_is_drawn() -> None:
 
 def test_the_text_does_not_depend_on_the_hash_seed() -> None:
     code = (
-        "from tests.strategies import soda_tree; from bbtc.export.registry import *;"
+        "from tests.strategies import soda_tree; from bbtc.backends.registry import *;"
         "print(*[(e := load_exporter(f)).export(soda_tree(), parse_options(e, o), None)"
         " for f, o in [('dot', {'legend': 'true'}), ('svg', {'layout': 'bbtc', 'legend': 'true'})]])"
     )

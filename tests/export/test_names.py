@@ -9,7 +9,7 @@ from typing import Literal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bbtc.export.names import (
+from bbtc.backends.names import (
     PYTHON_RESERVED,
     Symbol,
     identifiers,

@@ -16,13 +16,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 
+from bbtc.backends.pytrees.exporter import py_trees_names
+from bbtc.backends.pytrees.pycode import call, layout, literal
+from bbtc.backends.pytrees.runtime import MODULES, used_in
+from bbtc.backends.registry import load_exporter, parse_options
+from bbtc.backends.shape import DEEPEST_TREE
 from bbtc.belief.state import compile_action, initial_belief
 from bbtc.diagnostics import BbtcError
-from bbtc.export.pycode import call, layout, literal
-from bbtc.export.pytrees import py_trees_names
-from bbtc.export.pytrees_runtime import MODULES, used_in
-from bbtc.export.registry import load_exporter, parse_options
-from bbtc.export.shape import DEEPEST_TREE
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.replay.engines import PyTreesReplay

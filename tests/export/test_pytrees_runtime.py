@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bbtc.backends.names import module_name
+from bbtc.backends.registry import load_exporter, parse_options
 from bbtc.diagnostics import BbtcError
-from bbtc.export.names import module_name
-from bbtc.export.registry import load_exporter, parse_options
 from bbtc.ground.condition import Is
 from bbtc.ground.task import InitialState
 from bbtc.kleene import Truth

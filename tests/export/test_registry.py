@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 import bbtc
+from bbtc.backends import registry
+from bbtc.backends.exporter import Exporter, Files, Option
+from bbtc.backends.registry import format_names, load_exporter, parse_options
 from bbtc.diagnostics import BbtcError
-from bbtc.export import registry
-from bbtc.export.registry import Exporter, Files, Option, format_names, load_exporter, parse_options
 
 DOMAINS = Path(__file__).parents[2] / "domains"
 
@@ -83,7 +84,7 @@ def test_a_plugin_with_the_name_of_a_built_in_is_an_error(monkeypatch: pytest.Mo
     assert load_exporter("btcpp").name == "btcpp"
 
 
-@pytest.mark.parametrize("value", ["no.such.module:x", "bbtc.export.registry:no_such_object"])
+@pytest.mark.parametrize("value", ["no.such.module:x", "bbtc.backends.registry:no_such_object"])
 def test_a_plugin_that_does_not_load_is_an_error(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     install(monkeypatch, mine=value)
     with pytest.raises(BbtcError) as error:

@@ -16,9 +16,9 @@ import yaml
 from hypothesis import given
 
 from bbtc.artefacts import load_tree, tree_to_json
+from bbtc.backends.pictures.diagram import diagram
+from bbtc.backends.registry import load_exporter, parse_options
 from bbtc.diagnostics import BbtcError
-from bbtc.export.diagram import diagram
-from bbtc.export.registry import load_exporter, parse_options
 from bbtc.ground.condition import Is
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile

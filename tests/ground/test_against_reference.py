@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import BbtcError, Report
-from bbtc.ground import bulk, program, relevance
+from bbtc.ground import relevance
 from bbtc.ground.condition import evaluate
 from bbtc.ground.instantiate import ground, instantiate
 from bbtc.ground.prune import prune
+from bbtc.ground.reachability import bulk, program
 from bbtc.ground.task import Factor, GroundAction, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits

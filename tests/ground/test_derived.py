@@ -8,7 +8,7 @@ import pytest
 
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.bounds import task_value
+from bbtc.planner.bounds import task_value
 from tests.ground.examples import task_of
 
 _TEMPLATE = "(:template do :effect (done) :body (finish))"

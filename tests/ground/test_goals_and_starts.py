@@ -15,9 +15,9 @@ from bbtc.ground.instantiate import ground, instantiate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan.space import explore_space
-from bbtc.plan.value import reachability
-from bbtc.plan.value_cost import least_cost
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.ssp import least_cost
 from tests.ground.examples import model_of, task_of
 
 _DOMAIN = """(define (domain d) (:types t) (:predicates (p ?x - t) (q) (r) (on ?x ?y - t) (above ?x ?y - t))

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from bbtc.diagnostics import BbtcError, Diagnostic, Report
-from bbtc.ground.atoms import Atoms
 from bbtc.ground.goal import goal_doubts
 from bbtc.ground.instantiate import ground
 from bbtc.ground.lower import Lowering
 from bbtc.ground.missing import Missing, NoneTogether, NoObject, Search
 from bbtc.ground.normal import conjuncts
-from bbtc.ground.reach import reach
+from bbtc.ground.reachability.atoms import Atoms
+from bbtc.ground.reachability.reach import reach
 from bbtc.ground.start import beginning
 from bbtc.limits import Limits
 from bbtc.model.domain import InitialFact, Model

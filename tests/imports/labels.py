@@ -6,7 +6,7 @@ import random
 from collections.abc import Iterator
 from dataclasses import replace
 
-from bbtc.export.shape import words_of, written
+from bbtc.backends.shape import words_of, written
 from bbtc.ground.condition import And, Or
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 

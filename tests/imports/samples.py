@@ -8,9 +8,9 @@ from fractions import Fraction
 from importlib.util import find_spec
 from xml.etree import ElementTree as ET
 
-from bbtc.artefacts.btcpp_xml import Imported, tree_from_btcpp
+from bbtc.backends.btcpp.exporter import btcpp
+from bbtc.backends.btcpp.reader.xml import Imported, tree_from_btcpp
 from bbtc.diagnostics import BbtcError, Diagnostic, Report
-from bbtc.export.btcpp import btcpp
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Not, Or
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth

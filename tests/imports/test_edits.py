@@ -9,9 +9,9 @@ from fractions import Fraction
 
 import pytest
 
-from bbtc.artefacts.btcpp_xml import tree_from_btcpp
+from bbtc.backends.btcpp.exporter import btcpp
+from bbtc.backends.btcpp.reader.xml import tree_from_btcpp
 from bbtc.diagnostics import BbtcError, LimitReached, Report
-from bbtc.export.btcpp import btcpp
 from bbtc.limits import Limits
 from bbtc.pipeline import import_tree
 from bbtc.source import SourceFile

@@ -10,9 +10,9 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from bbtc.artefacts.btcpp_xml import tree_from_btcpp
+from bbtc.backends.btcpp.exporter import btcpp
+from bbtc.backends.btcpp.reader.xml import tree_from_btcpp
 from bbtc.diagnostics import BbtcError, Report
-from bbtc.export.btcpp import btcpp
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import Tree, walk
 from bbtc.tree.validate import check_tree

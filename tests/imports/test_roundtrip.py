@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 
 from bbtc.artefacts import dumps, load_tree, tree_to_json
-from bbtc.artefacts.btcpp_xml import tree_from_btcpp
+from bbtc.backends.btcpp.exporter import btcpp
+from bbtc.backends.btcpp.reader.xml import tree_from_btcpp
+from bbtc.backends.shape import words_of, written
 from bbtc.diagnostics import BbtcError, Report
-from bbtc.export.btcpp import btcpp
-from bbtc.export.shape import words_of, written
 from bbtc.ground.condition import TRUE, And, Is, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth

@@ -10,9 +10,9 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from bbtc.artefacts.btcpp_patterns import READ
-from bbtc.artefacts.btcpp_unread import WITHOUT_MEANING
-from bbtc.export.btcpp_idioms import LATCH, SKIPPER
+from bbtc.backends.btcpp.idioms import LATCH, SKIPPER
+from bbtc.backends.btcpp.reader.patterns import READ
+from bbtc.backends.btcpp.reader.unread import WITHOUT_MEANING
 from bbtc.tree.nodes import ControlNode, Node, Tree
 from tests import btcpp_nodes
 from tests.imports.engine_nodes import NODES, PORTS, SCRIPTS

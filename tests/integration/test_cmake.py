@@ -200,7 +200,7 @@ def test_a_program_is_compiled_with_the_interface_of_its_robot(source: Path, gen
 
 
 def test_the_headers_that_cmake_expects_are_those_that_are_made() -> None:
-    from bbtc.export.btcpp_project import btcpp_project
+    from bbtc.backends.btcpp.project import btcpp_project
     from tests.strategies import soda_tree
 
     config = (CMAKE_DIR / "bbtcConfig.cmake").read_text()

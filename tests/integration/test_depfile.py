@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from bbtc.depfile import depfile
 from bbtc.diagnostics import BbtcError
+from bbtc.files.depfile import depfile
 from tests.build.projects import COIN, bbtc
 from tests.integration.tools import tool
 from tests.long_form import amount

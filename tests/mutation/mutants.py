@@ -60,7 +60,8 @@ class Mutant:
 
 def mutants_of(root: Path, file: str) -> list[Mutant]:
     """The mutants of a module, in order of their places. Left out is what no test could tell: annotations,
-    texts, assertions (they are never false), and private numbers of a module (bounds of effort)."""
+    texts, assertions (they are never false), private numbers of a module (bounds of effort), and how often
+    the limits are looked at."""
     source = (root / file).read_text("utf-8")
     finder = _Finder(file, source)
     finder.visit(ast.parse(source))
@@ -219,11 +220,16 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_If(self, node: ast.If) -> None:
-        if ast.unparse(node.test) == "TYPE_CHECKING":
+        if ast.unparse(node.test) == "TYPE_CHECKING" or _looks_at_limits(node):
             return
         for value in ("True", "False"):
             self._mutant(node.test, value)
         self.generic_visit(node)
+
+    def visit_keyword(self, node: ast.keyword) -> None:
+        """``strict=True`` is an assertion."""
+        if node.arg != "strict":
+            self.visit(node.value)
 
     def visit_comprehension(self, node: ast.comprehension) -> None:
         for condition in node.ifs:
@@ -239,6 +245,8 @@ class _Finder(ast.NodeVisitor):
 
     def visit_Expr(self, node: ast.Expr) -> None:
         if isinstance(node.value, ast.Call):
+            if ast.unparse(node.value.func) == "assert_never":
+                return  # an assertion, which the type checker holds
             self._mutant(node, "pass")
             self.generic_visit(node)
 
@@ -247,6 +255,17 @@ class _Finder(ast.NodeVisitor):
 
     def visit_Break(self, node: ast.Break) -> None:
         self._mutant(node, "pass")
+
+
+def _looks_at_limits(node: ast.If) -> bool:
+    """Whether all that depends on it is a look at the limits, as in every thousandth round of a loop."""
+    return not node.orelse and all(
+        isinstance(each, ast.Expr)
+        and isinstance(each.value, ast.Call)
+        and isinstance(each.value.func, ast.Attribute)
+        and each.value.func.attr.startswith("check_")
+        for each in node.body
+    )
 
 
 def _short(text: str) -> str:

@@ -8,6 +8,7 @@ import pytest
 
 from tests.mutation.__main__ import EQUIVALENT, PACKAGES, REPOSITORY, explained, report
 from tests.mutation.mutants import Mutant, is_change, mutants_of
+from tests.mutation.reach import IMPORTED, Reach
 from tests.mutation.trial import Project, Tried, drawn, selection, try_all
 
 _SUMS = '''"""Sums."""
@@ -84,7 +85,7 @@ def test_a_mutant_dies_survives_or_runs_out_of_time_as_its_tests_say(toy: Projec
     told: list[Tried] = []
     found = try_all(toy, [changes[KILLED], changes[EQUAL], changes[NEVER]], 2, 100, told.append)
     assert [each.fate for each in found] == ["killed", "survived", "killed"]
-    assert found[0].by.startswith("tests/test_sums.py::test_small")
+    assert found[0].by.startswith("tests/test_sums.py::test_")
     assert found[2].by.startswith("tests/test_sums.py::test_large")
     assert sorted(told, key=found.index) == found
     assert {path: path.read_bytes() for path in toy.root.rglob("*") if path.is_file()} == before
@@ -112,10 +113,30 @@ def test_a_sample_is_drawn_by_its_seed(toy: Project) -> None:
     assert sorted(each.key for each in every) == sorted(each.key for each in _changes(toy).values())
     assert drawn(toy, 3, 5) == drawn(toy, 3, 5)
     assert len({tuple(each.key for each in drawn(toy, 3, seed)) for seed in range(10)}) > 1
+    (toy.root / "toy/sums.py").write_text(_SUMS.replace("    return found\n", "    return found + 0\n"))
+    new = drawn(toy, 100, 0)
+    assert [each.key for each in new if "+ 0" not in each.original] == [each.key for each in every]
 
 
-def test_tests_that_name_the_module_come_first(toy: Project) -> None:
-    assert selection(toy, "toy/sums.py") == ["tests/test_sums.py", "tests/test_other.py"]
+def test_the_tests_that_run_a_line_are_tried_quick_ones_first(toy: Project) -> None:
+    changes = _changes(toy)
+    file = "toy/sums.py"
+    reach = Reach(
+        {file: {6: frozenset({IMPORTED}), 12: frozenset({"slow"}), 14: frozenset({"slow", "quick"})}},
+        {"slow": 2.0, "quick": 0.1},
+    )
+    assert selection(toy, reach, changes[KILLED]) == ["quick", "slow"]
+    assert selection(toy, reach, changes[KILLED], most=1) == ["quick"]
+    assert selection(toy, reach, changes[NEVER]) == ["quick", "slow"], "else those of the function"
+    assert selection(toy, reach, changes["LIMIT = 10", "LIMIT = 11"]) == ["quick", "slow"]
+
+
+def test_what_no_test_runs_survives(toy: Project) -> None:
+    source = _SUMS + "\n\ndef never(n: int) -> int:\n    return n + 1\n"
+    (toy.root / "toy/sums.py").write_text(source)
+    (never,) = [each for each in mutants_of(toy.root, "toy/sums.py") if each.mutant == "return (n - 1)"]
+    (found,) = try_all(toy, [never], 1, 100, lambda _: None)
+    assert (found.fate, found.seconds) == ("survived", 0)
 
 
 def test_survivors_have_to_be_explained_and_few(toy: Project) -> None:

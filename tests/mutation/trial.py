@@ -1,7 +1,8 @@
-"""Trying mutants: copies of the checkout, tests by package, and what became of each mutant."""
+"""Trying mutants: copies of the checkout, the tests that reach a mutant, and what became of each."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import queue
 import shutil
@@ -10,15 +11,18 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
-from random import Random
 from typing import Literal, TypeAlias
 
+import pytest
+
 from tests.mutation.mutants import Mutant, is_change, modules, mutants_of
+from tests.mutation.reach import IMPORTED, Reach, function_around, lines_of, reach_of
 
 Fate: TypeAlias = Literal["killed", "timeout", "survived"]
 
@@ -44,14 +48,19 @@ class Tried:
 
 
 def drawn(project: Project, count: int, seed: int) -> list[Mutant]:
-    """A sample of the mutants, by a seed: as many of each package as of the next."""
-    random = Random(seed)
+    """A sample of the mutants, by a seed: as many of each package as of the next. What it takes of code that
+    stays does not hang on code that changes."""
+
+    def chance(mutant: Mutant) -> bytes:
+        _, *known = mutant.key
+        return hashlib.sha256("\n".join((str(seed), *known)).encode()).digest()
+
     left: dict[str, list[Mutant]] = {}
     for package in project.packages:
         files = modules(project.root, package)
         left[package] = [mutant for file in files for mutant in mutants_of(project.root, file)]
     for every in left.values():
-        random.shuffle(every)
+        every.sort(key=chance, reverse=True)
     found: list[Mutant] = []
     while len(found) < count and any(left.values()):
         for every in left.values():
@@ -63,23 +72,28 @@ def drawn(project: Project, count: int, seed: int) -> list[Mutant]:
     return found
 
 
-def selection(project: Project, file: str) -> list[str]:
-    """The tests to run for a module: those of its package, files that name the module before others."""
-    package = next(name for name in project.packages if file.startswith(f"{name}/"))
+def test_files(project: Project, package: str) -> list[str]:
+    """The files of tests that are to notice what is wrong with a package."""
     files: dict[str, None] = {}
     for place in project.packages[package]:
         path = project.root / place
-        found = sorted(path.glob("test_*.py")) if path.is_dir() else [path]
+        found = sorted(path.rglob("test_*.py")) if path.is_dir() else [path]
         files.update((each.relative_to(project.root).as_posix(), None) for each in found)
-    dotted = file.removesuffix(".py").replace("/", ".")
-    parent, _, name = dotted.rpartition(".")
-    wanted = (f"{dotted} ", f"{dotted}\n", f"from {parent} import {name}")
+    return list(files)
 
-    def names_it(test: str) -> bool:
-        text = (project.root / test).read_text("utf-8")
-        return any(each in text for each in wanted)
 
-    return sorted(files, key=lambda test: not names_it(test))  # stable: else as the project has them
+def selection(project: Project, reach: Reach, mutant: Mutant, most: float = inf) -> list[str]:
+    """The tests to run for a mutant, quick ones first, as many as take at most so many seconds together:
+    those that run the changed lines; where no test does (a line may have no instruction of its own), those
+    that run the function; for what runs while modules are imported, those that run anything of the module."""
+    source = (project.root / mutant.file).read_text("utf-8")
+    lines = lines_of(source, mutant.start, mutant.end)
+    tests = reach.running(mutant.file, lines) or reach.running(
+        mutant.file, function_around(source, mutant.line)
+    )
+    if IMPORTED in tests:
+        tests = reach.running(mutant.file, range(source.count("\n") + 2))
+    return reach.quick_first(tests - {IMPORTED}, most)
 
 
 class Copies:
@@ -108,10 +122,10 @@ class Copies:
             self._free.put(copy)
 
 
-def run_tests(copy: Path, tests: Sequence[str], seconds: float, jobs: int = 0) -> tuple[int | None, str]:
-    """The exit status of pytest (None: it took too long), and the first test that failed. All that it started
-    is ended with it."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-n", str(jobs), *tests]
+def run_tests(copy: Path, arguments: Sequence[str], seconds: float) -> tuple[int | None, str]:
+    """The exit status of pytest (None: it took too long), and what it printed. All that it started is ended
+    with it."""
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments]
     # Modules that change within a second would be taken from what was compiled before.
     environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
     environment.pop("BBTC_LONG", None)
@@ -125,70 +139,86 @@ def run_tests(copy: Path, tests: Sequence[str], seconds: float, jobs: int = 0) -
         text=True,
         start_new_session=True,
     )
-    status: int | None
     try:
         output, _ = process.communicate(timeout=seconds)
-        status = process.returncode
     except subprocess.TimeoutExpired:
-        status, output = None, ""
+        return None, ""
     finally:
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+    return process.returncode, output
+
+
+def first_failure(output: str) -> str:
+    """The first test that failed, as pytest names it; if none is named, the end of what it printed."""
     failed = [line for line in output.splitlines() if line.startswith(("FAILED ", "ERROR "))]
-    return status, failed[0].split(" - ")[0].partition(" ")[2] if failed else output[-200:]
+    return failed[0].split(" - ")[0].partition(" ")[2] if failed else output[-200:]
 
 
-def tried(copies: Copies, mutant: Mutant, seconds: float) -> Tried:
-    """What the tests say of a mutant. A status of pytest other than passed and failed (nothing collected,
-    say) is an error of the trial, but for what fails while it is imported, which is noticed, too."""
-    tests = selection(copies.project, mutant.file)
-    begun = time.monotonic()
+def measured(project: Project, copies: Copies, packages: Iterable[str], jobs: int) -> Reach:
+    """Run the tests of packages without a mutant, and note which lines each of them runs. Raises
+    ``RuntimeError`` if one fails: then they would kill every mutant and say nothing."""
+    files = list(dict.fromkeys(file for package in packages for file in test_files(project, package)))
     with copies.one() as copy:
+        data = copy / ".coverage"
+        covered = [f"--cov={name}" for name in project.packages]
+        status, output = run_tests(
+            copy,
+            ["-q", "-vv", "-n", str(jobs if jobs > 1 else 0), *covered, "--cov-context=test", "--cov-report=",
+             "--durations=0", *files],
+            7200,
+        )  # fmt: skip
+        if status != 0:
+            raise RuntimeError(f"the tests fail without a mutant: {first_failure(output)}")
+        reach = reach_of(copy, data, output)
+        data.unlink()
+    return reach
+
+
+def tried(copies: Copies, reach: Reach, mutant: Mutant, seconds: float, most: float = inf) -> Tried:
+    """What the tests say of a mutant; ``most`` as in :func:`selection`. No test that reaches it: it survives.
+    A status of pytest that tells of no tests is an error of the trial; what fails while it is imported is
+    noticed, too."""
+    tests = selection(copies.project, reach, mutant, most)
+    begun = time.monotonic()
+    if not tests:
+        return Tried(mutant, "survived", "", 0.0)
+    with copies.one() as copy, tempfile.NamedTemporaryFile("w", encoding="utf-8", suffix=".txt") as listed:
         path = copy / mutant.file
         source = path.read_text("utf-8")
         path.write_text(mutant.applied(source), "utf-8")
+        listed.write("\n".join(tests))
+        listed.flush()
         try:
-            status, by = run_tests(copy, tests, seconds)
+            status, output = run_tests(copy, ["-x", "-q", "-n", "0", f"@{listed.name}"], seconds)
         finally:
             path.write_text(source, "utf-8")
-    fate: Fate = "timeout" if status is None else "survived" if status == 0 else "killed"
-    if status == 5:
+    if status == pytest.ExitCode.NO_TESTS_COLLECTED:
         raise RuntimeError(f"no tests were found for {mutant.file}")
-    return Tried(mutant, fate, "" if fate == "survived" else by, time.monotonic() - begun)
+    fate: Fate = "timeout" if status is None else "survived" if status == 0 else "killed"
+    return Tried(mutant, fate, "" if fate == "survived" else first_failure(output), time.monotonic() - begun)
 
 
 def try_all(
     project: Project,
     mutants: Sequence[Mutant],
     jobs: int,
-    seconds: float | None,
+    seconds: float,
     tell: Callable[[Tried], None],
-    *,
-    trusted: bool = False,
+    most: float = inf,
 ) -> list[Tried]:
-    """What became of each mutant, in their order. Raises ``RuntimeError`` if the tests fail without any: then
-    they would kill every mutant and say nothing. ``seconds`` None: the tests of a mutant may take as long as
-    all took without any, twice, and a minute. ``trusted``: the tests are known to pass."""
+    """What became of each mutant, in their order. Raises ``RuntimeError`` if the tests fail without any.
+    ``seconds``: for the tests of one mutant; ``most`` as in :func:`selection`."""
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copies = Copies(project, Path(folder), jobs)
-        begun = time.monotonic()
-        if not trusted:
-            _require_passing(project, copies, mutants, jobs)
-        limit = seconds or 60 + 2 * jobs * (time.monotonic() - begun)
+        packages = [name for name in project.packages if any(m.file.startswith(f"{name}/") for m in mutants)]
+        reach = measured(project, copies, packages, jobs)
 
         def one(mutant: Mutant) -> Tried:
-            done = tried(copies, mutant, limit)
+            done = tried(copies, reach, mutant, seconds, most)
             tell(done)
             return done
 
         with ThreadPoolExecutor(jobs) as pool:
             return list(pool.map(one, mutants))
-
-
-def _require_passing(project: Project, copies: Copies, mutants: Sequence[Mutant], jobs: int) -> None:
-    tests = list(dict.fromkeys(test for mutant in mutants for test in selection(project, mutant.file)))
-    with copies.one() as copy:
-        status, failed = run_tests(copy, tests, 3600, jobs if jobs > 1 else 0)
-    if status != 0:
-        raise RuntimeError(f"the tests fail without a mutant: {failed}")

@@ -12,8 +12,8 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.result import Plan, Refinement
-from bbtc.plan.strategies import DEFAULT
+from bbtc.planner.result import Plan, Refinement
+from bbtc.planner.strategies import DEFAULT
 from bbtc.tree.nodes import walk
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.plan.test_refine import action, task
@@ -89,9 +89,9 @@ def test_a_large_tree_is_worth_a_longer_second_opinion(monkeypatch: pytest.Monke
     (of,) = (task_of(p) for p in PROBLEMS if str(p) == "warehouse/blocked-aisle")
     found, small = size(plan(of, "search")), size(plan(of, "policy"))
     assert small < found
-    monkeypatch.setattr("bbtc.plan.auto._STATES_AND_ACTIONS", 1)
-    monkeypatch.setattr("bbtc.plan.auto._refine", lambda *_: None)
-    monkeypatch.setattr("bbtc.plan.auto.LARGE_TREE", found)
+    monkeypatch.setattr("bbtc.planner.auto._STATES_AND_ACTIONS", 1)
+    monkeypatch.setattr("bbtc.planner.auto._refine", lambda *_: None)
+    monkeypatch.setattr("bbtc.planner.auto.LARGE_TREE", found)
     assert size(plan(of, "auto")) == found
-    monkeypatch.setattr("bbtc.plan.auto.LARGE_TREE", found - 1)
+    monkeypatch.setattr("bbtc.planner.auto.LARGE_TREE", found - 1)
     assert size(plan(of, "auto")) == small

@@ -16,9 +16,9 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.bounds import task_value
-from bbtc.plan.options import Options
-from bbtc.plan.result import Plan
+from bbtc.planner.bounds import task_value
+from bbtc.planner.options import Options
+from bbtc.planner.result import Plan
 from tests.domains.problems import bbtc
 from tests.plan.test_refine import action, task
 

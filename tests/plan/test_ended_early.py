@@ -203,7 +203,7 @@ def test_planning_has_a_time_limit_by_default(monkeypatch: pytest.MonkeyPatch, t
     source = SourceFile("keys.pddl", TEXT)
     from click.testing import CliRunner
 
-    from bbtc.cli.commands import cli
+    from bbtc.cli.group import cli
 
     bbtc.plan(source, target=0)
     bbtc.plan(source, target=0, limits=Limits())

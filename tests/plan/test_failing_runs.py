@@ -20,8 +20,8 @@ from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import Condition, Is, conjunction
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan.failing_runs import failing_runs
-from bbtc.plan.why_not import Block, RootFinder
+from bbtc.planner.failing_runs import failing_runs
+from bbtc.planner.why_not import Block, RootFinder
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
 from tests.domains.problems import bbtc
 from tests.plan.test_refine import action, task

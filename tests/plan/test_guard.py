@@ -18,12 +18,12 @@ from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task, simulate_tree
-from bbtc.plan.guard import guarded
-from bbtc.plan.options import Options
-from bbtc.plan.result import Plan
-from bbtc.plan.strategies import STRATEGIES
+from bbtc.planner.guard import guarded
+from bbtc.planner.options import Options
+from bbtc.planner.result import Plan
+from bbtc.planner.strategies import STRATEGIES
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree, actions_of, walk
-from bbtc.verify.verdict import verify
+from bbtc.verifier.verdict import verify
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.long_form import amount
 from tests.profiles import examples

@@ -11,12 +11,12 @@ from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan import heuristic_search
-from bbtc.plan.heuristic import Heuristic
-from bbtc.plan.heuristic_search import search_bounds
-from bbtc.plan.space import explore_space
-from bbtc.plan.value import reachability
-from bbtc.plan.value_best import best_known
+from bbtc.planner.mdp import bounded_search as heuristic_search
+from bbtc.planner.mdp.bounded_search import search_bounds
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.h_add import Heuristic
+from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.solve import best_known
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases, public
 from tests.plan.test_refine import action, task

@@ -17,9 +17,9 @@ from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
-from bbtc.plan.bounds import task_value
-from bbtc.plan.options import Options
-from bbtc.plan.space import explore_space
+from bbtc.planner.bounds import task_value
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.options import Options
 from bbtc.source import SourceFile
 from tests.conftest import REPOSITORY
 from tests.plan.test_bounds import coins

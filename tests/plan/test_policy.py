@@ -21,16 +21,16 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.options import DEFAULTS, Options
-from bbtc.plan.policy_retry import longest_run
-from bbtc.plan.result import Plan
-from bbtc.plan.space import explore_space
-from bbtc.plan.synthesis_rules import Literal, Rule
-from bbtc.plan.synthesis_rules import Test as ValueTest
-from bbtc.plan.synthesis_tree import _Builder
-from bbtc.plan.value import reachability
-from bbtc.plan.value_cost import least_cost
-from bbtc.plan.value_horizon import horizon_values
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.finite_horizon import horizon_values
+from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.ssp import least_cost
+from bbtc.planner.options import DEFAULTS, Options
+from bbtc.planner.result import Plan
+from bbtc.planner.synthesis.rules import Literal, Rule
+from bbtc.planner.synthesis.rules import Test as ValueTest
+from bbtc.planner.synthesis.tree import _Builder
+from bbtc.rewrite.retry import longest_run
 from bbtc.tree.nodes import ActionNode, ControlNode, Node, retries_of, walk
 from bbtc.tree.validate import check_tree
 from tests.plan.examples import Optimum, cases, corpus_optima

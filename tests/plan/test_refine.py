@@ -16,8 +16,8 @@ from bbtc.ground.condition import TRUE, Condition, Is, Or, conjunction
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan.refine import refine
-from bbtc.plan.result import Plan
+from bbtc.planner.chaining.refine import refine
+from bbtc.planner.result import Plan
 from bbtc.tree.nodes import ActionNode, walk
 from bbtc.tree.validate import check_tree
 from tests.ground.examples import task_of

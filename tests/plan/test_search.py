@@ -17,9 +17,9 @@ from bbtc.ground.task import Effect, Factor, GroundAction, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.options import Options, Retries
-from bbtc.plan.result import Plan
-from bbtc.plan.simplify import size
+from bbtc.planner.options import Options, Retries
+from bbtc.planner.result import Plan
+from bbtc.rewrite.simplify import size
 from bbtc.tree.nodes import actions_of, retries_of
 from bbtc.tree.validate import check_tree
 from tests.plan.examples import Optimum, cases
@@ -142,3 +142,22 @@ def test_every_plan_of_a_random_task_ends_soundly(of: Task, target: str, retries
     assert simulate(of, tree.root, Limits()).success == tree.success_probability
     assert (tree.status == "target-reached") == (tree.success_probability >= Fraction(target))
     assert all(not node.latched for node in actions_of(tree.root))
+
+
+def test_goals_are_put_into_order_by_what_the_guards_of_effects_need() -> None:
+    """The tea is at hand once it is fetched with the door open; in the end the door must be shut."""
+    shut, tea = 0, 1
+    carried = Effect(Is(shut, F), ((tea, T),))
+    fetch = GroundAction("fetch", (), Is(tea, F), (Factor((Outcome(Fraction(1), (carried,)),)),))
+    done = plan(
+        task(
+            "shut tea",
+            {shut: T},
+            conjunction([Is(shut, T), Is(tea, T)]),
+            action("open", TRUE, ("1", {shut: F})),
+            action("close", Is(shut, F), ("1", {shut: T})),
+            fetch,
+        ),
+        "1",
+    )
+    assert (done.tree.status, done.figures.actions) == ("target-reached", 3)

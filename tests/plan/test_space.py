@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 from fractions import Fraction
+from random import Random
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.state import Values, compile_action, initial_belief
-from bbtc.ground.condition import TRUE, Is, evaluate
+from bbtc.ground.condition import TRUE, Is, conjunction, evaluate
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan import space_actions, space_packing
-from bbtc.plan.space import StateSpace, explore_space
-from bbtc.plan.space_table import StateTable
+from bbtc.planner.mdp import packing as space_packing
+from bbtc.planner.mdp import transitions as space_actions
+from bbtc.planner.mdp.explore import StateSpace, explore_space
+from bbtc.planner.mdp.state_table import StateTable
 from tests.profiles import examples
 from tests.strategies import tasks
 
@@ -158,3 +160,22 @@ def test_conditions_of_any_shape_become_cubes() -> None:
     packing = space_packing.Packing((2, None), 1)
     assert space_packing.bit_test(packing, TRUE) == space_packing.ALWAYS
     assert space_packing.bit_test(packing, Is(1, Truth.UNKNOWN)) == space_packing.NEVER
+
+
+@examples(60)
+@given(values=st.lists(st.sampled_from([0, 1, 2]), min_size=90, max_size=90), seed=st.integers(0, 2**32))
+def test_conditions_over_several_words_hold_where_the_semantics_say(values: list[int], seed: int) -> None:
+    """A conjunction of what most of the variables are, and one that is wrong in a place."""
+    random = Random(seed)
+    packing = space_packing.Packing(tuple(range(90, 180)), 3)
+    rows = packing.split([packing.pack(bytes(values)), packing.pack(bytes(reversed(values)))])
+    asked = sorted(random.sample(range(90), random.choice([2, 45, 90])))
+    conditions = [conjunction([Is(v, Truth(values[v])) for v in asked])]
+    wrong = random.choice(asked)
+    conditions.append(
+        conjunction([Is(v, Truth((values[v] + (v == wrong)) % 3)) for v in asked])  # one value is another
+    )
+    for condition in conditions:
+        test = space_packing.bit_test(packing, condition)
+        expected = [evaluate(condition, bytes(row)) is Truth.TRUE for row in (values, values[::-1])]
+        assert space_packing.holds(packing, test, rows).tolist() == expected

@@ -10,9 +10,9 @@ from bbtc.belief.chain import explore
 from bbtc.ground.condition import TRUE, Is
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan.draft import Frozen
-from bbtc.plan.refine import refine
-from bbtc.plan.targets import Simulated
+from bbtc.planner.chaining.draft import Frozen
+from bbtc.planner.chaining.flaws import Simulated
+from bbtc.planner.chaining.refine import refine
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode
 from tests.ground.examples import task_of
 from tests.plan.test_refine import action, task

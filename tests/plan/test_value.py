@@ -15,13 +15,13 @@ from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.plan import value as value_module
-from bbtc.plan.heuristic_search import search_bounds
-from bbtc.plan.space import explore_space
-from bbtc.plan.value import Reachability, best_probability, reachability
-from bbtc.plan.value_cost import least_cost
-from bbtc.plan.value_exact import solve
-from bbtc.plan.value_horizon import horizon_values
+from bbtc.planner.mdp import maxprob as value_module
+from bbtc.planner.mdp.bounded_search import search_bounds
+from bbtc.planner.mdp.exact import solve
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.finite_horizon import horizon_values
+from bbtc.planner.mdp.maxprob import Reachability, best_probability, reachability
+from bbtc.planner.mdp.ssp import least_cost
 from tests.plan.examples import Optimum, cases, corpus_optima
 from tests.plan.test_refine import action, task
 from tests.plan.test_space import by_simulator
@@ -163,7 +163,7 @@ def test_bounds_from_floats_hold_the_exact_values(of: Task, monkeypatch: pytest.
     with monkeypatch.context() as patch:
         patch.setattr(value_module, "_MOST_EXACT", -1)
         floats = reachability(space, Limits())
-        patch.setattr("bbtc.plan.value_horizon._MOST_EXACT", -1)
+        patch.setattr("bbtc.planner.mdp.finite_horizon._MOST_EXACT", -1)
         horizon = horizon_values(space, 5, Limits()) if len(space.edge_target) else None
     for state in range(len(space.states)):
         known, close = exact.bounds(state), floats.bounds(state)

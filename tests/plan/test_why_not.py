@@ -20,8 +20,8 @@ from bbtc.ground.condition import Is, conjunction
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
-from bbtc.plan import policy
-from bbtc.plan.why_not import Block, DeadEnd, dead_ends
+from bbtc.planner.synthesis import policy
+from bbtc.planner.why_not import Block, DeadEnd, dead_ends
 from bbtc.source import SourceFile
 from tests.domains.problems import REPOSITORY, bbtc
 from tests.plan.test_bounds import ONESHOT, coins, one_shot
@@ -154,7 +154,7 @@ def test_an_interrupt_leaves_the_best_tree_so_far(monkeypatch: pytest.MonkeyPatc
 def test_an_interrupted_search_leaves_what_it_knows(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
 ) -> None:
-    from bbtc.plan.heuristic_search import _Search
+    from bbtc.planner.mdp.bounded_search import _Search
 
     count = 0
     plunge = _Search._plunge

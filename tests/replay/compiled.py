@@ -15,8 +15,8 @@ from typing import Literal
 
 import pytest
 
-from bbtc.export.btcpp import btcpp
-from bbtc.export.btcpp_names import btcpp_names
+from bbtc.backends.btcpp.exporter import btcpp
+from bbtc.backends.btcpp.names import btcpp_names
 from bbtc.ground.task import ground_name
 from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing
 from bbtc.tree.nodes import Tree

@@ -17,8 +17,8 @@ from bbtc.diagnostics import BbtcError, LimitReached, Report
 from bbtc.ground.task import split_name
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
-from bbtc.plan.options import Options
-from bbtc.plan.strategies import STRATEGIES
+from bbtc.planner.options import Options
+from bbtc.planner.strategies import STRATEGIES
 from bbtc.replay.engines import BtcppReplay, PyTreesReplay, Replay
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import Tree

@@ -10,7 +10,7 @@ import pytest
 
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.options import Options
+from bbtc.planner.options import Options
 from bbtc.replay.script import Values
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.long_form import amount

@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 
 from bbtc import pipeline
+from bbtc.backends.models.jani import jani, task_text
+from bbtc.backends.models.prism import prism, readable_names, tree_program
 from bbtc.diagnostics import BbtcError
-from bbtc.export.jani import jani, task_text
-from bbtc.export.prism import prism, readable_names, tree_program
 from bbtc.limits import Limits
 from bbtc.tree.nodes import Tree
-from bbtc.verify import storm, verdict
-from bbtc.verify.prism import KEYWORDS
+from bbtc.verifier import storm, verdict
+from bbtc.verifier.prism import KEYWORDS
 from tests.domains.problems import REPOSITORY, bbtc
 from tests.profiles import examples
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
@@ -94,7 +94,7 @@ def test_a_verified_plan_is_written_and_a_wrong_one_is_not(
     def other(tree: Tree, limits: Limits, engine: verdict.Engine) -> verdict.Verdict:
         return honest(replace(tree, success_probability=tree.success_probability / 2), limits, engine)
 
-    monkeypatch.setattr("bbtc.verify.verdict.verify", other)
+    monkeypatch.setattr("bbtc.verifier.verdict.verify", other)
     done = bbtc("plan", *FILES, "--strategy", "refine", "-q", "--verify", "-o", str(out))
     assert done.status == 1
     assert not out.exists()
@@ -143,7 +143,8 @@ def test_no_name_leaves_its_comment(tree: Tree) -> None:
 def test_the_layer_of_verification_is_told_apart() -> None:
     """The contract that import-linter checks is there, and forbids what it should."""
     text = (REPOSITORY / "pyproject.toml").read_text(encoding="utf-8")
-    contract = 'source_modules = ["bbtc.verify"]\nforbidden_modules = ["bbtc.belief", "bbtc.plan"]\n'
+    forbidden = 'forbidden_modules = ["bbtc.belief", "bbtc.rewrite", "bbtc.planner"]\n'
+    contract = f'source_modules = ["bbtc.verifier"]\n{forbidden}'
     assert contract in text
     assert not text.split(contract)[1].startswith("allow_indirect_imports")
 

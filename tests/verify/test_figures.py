@@ -18,11 +18,11 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.syntax.reader import read_source
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
-from bbtc.verify.chain import Form, chain_of, solvable_chain
-from bbtc.verify.explore import explore
-from bbtc.verify.program import Program
-from bbtc.verify.solve import Recomputed, recompute
-from bbtc.verify.verdict import verify
+from bbtc.verifier.chain import Form, chain_of, solvable_chain
+from bbtc.verifier.explore import explore
+from bbtc.verifier.program import Program
+from bbtc.verifier.solve import Recomputed, recompute
+from bbtc.verifier.verdict import verify
 from tests.conftest import GOLDEN
 from tests.long_form import amount
 from tests.plan.test_refine import action, task

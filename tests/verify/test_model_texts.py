@@ -8,18 +8,18 @@ from itertools import pairwise
 
 import pytest
 
+from bbtc.backends.models.jani import jani
+from bbtc.backends.models.jani import task_text as jani_task
+from bbtc.backends.models.prism import prism
+from bbtc.backends.models.prism import task_text as prism_task
 from bbtc.belief.simulate import simulate
 from bbtc.diagnostics import BbtcError
-from bbtc.export.jani import jani
-from bbtc.export.jani import task_text as jani_task
-from bbtc.export.prism import prism
-from bbtc.export.prism import task_text as prism_task
 from bbtc.ground.condition import Is
 from bbtc.ground.task import Charge, Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
-from bbtc.verify.verdict import verify
+from bbtc.verifier.verdict import verify
 from tests.long_form import amount
 from tests.verify.test_storm import ask, ask_about_jani
 
@@ -155,3 +155,11 @@ def test_a_number_that_a_json_text_has_no_room_for_is_refused() -> None:
     assert "0.0" in prism.export(tree, {"form": "auto"}, None)
     with pytest.raises(BbtcError, match="BBT0113"):
         jani.export(tree, {"form": "auto"}, None)
+
+
+def test_what_is_certain_is_written_without_a_probability() -> None:
+    """As people write it, and on one line."""
+    commands = [line for line in prism_task(corridor(["a", "b", "c"])).splitlines() if "->" in line]
+    certain = [line for line in commands if line.endswith(";")]
+    assert len(certain) == len(commands) - 1, "but for the first step, which fails half the time"
+    assert not [line for line in certain if " : " in line.split("->")[1]]

@@ -13,14 +13,14 @@ from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
-from bbtc.plan.options import Options, Retries
-from bbtc.plan.strategies import STRATEGIES
+from bbtc.planner.options import Options, Retries
+from bbtc.planner.strategies import STRATEGIES
 from bbtc.tree.nodes import Tree
-from bbtc.verify import storm, storm_worker
-from bbtc.verify.chain import chain_of
-from bbtc.verify.naming import numbered
-from bbtc.verify.prism import prism_text
-from bbtc.verify.verdict import verify
+from bbtc.verifier import storm, storm_worker
+from bbtc.verifier.chain import chain_of
+from bbtc.verifier.naming import numbered
+from bbtc.verifier.prism import prism_text
+from bbtc.verifier.verdict import verify
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases
 from tests.profiles import examples

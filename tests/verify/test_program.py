@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bbtc.verify.program import (
+from bbtc.verifier.program import (
     NO,
     YES,
     AllOf,

@@ -10,24 +10,24 @@ from typing import Any
 import pytest
 from hypothesis import given
 
+from bbtc.backends.models.jani import jani
+from bbtc.backends.models.jani import task_text as jani_task
+from bbtc.backends.models.prism import prism
+from bbtc.backends.models.prism import task_text as prism_task
 from bbtc.belief.simulate import simulate
 from bbtc.diagnostics import BbtcError, LimitReached
-from bbtc.export.jani import jani
-from bbtc.export.jani import task_text as jani_task
-from bbtc.export.prism import prism
-from bbtc.export.prism import task_text as prism_task
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.plan.bounds import task_value
+from bbtc.planner.bounds import task_value
 from bbtc.tree.nodes import Tree
-from bbtc.verify import storm, storm_worker
-from bbtc.verify.chain import chain_of
-from bbtc.verify.explore import explore
-from bbtc.verify.naming import numbered
-from bbtc.verify.optimum import best_probability
-from bbtc.verify.prism import prism_text
-from bbtc.verify.process import process_of
-from bbtc.verify.verdict import TOLERANCE, verify
+from bbtc.verifier import storm, storm_worker
+from bbtc.verifier.chain import chain_of
+from bbtc.verifier.explore import explore
+from bbtc.verifier.naming import numbered
+from bbtc.verifier.optimum import best_probability
+from bbtc.verifier.prism import prism_text
+from bbtc.verifier.process import process_of
+from bbtc.verifier.verdict import TOLERANCE, verify
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases
 from tests.profiles import examples

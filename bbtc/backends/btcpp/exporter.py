@@ -1,0 +1,302 @@
+"""Exporter ``btcpp``: BehaviorTree.CPP v4 XML (4.6 and later).
+
+Templates, action schemas and tests of knowledge have BehaviorTrees of their own; conditions are leaves
+that return RUNNING for unknown. docs/export-btcpp.md explains every idiom.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from xml.etree.ElementTree import Comment, Element, SubElement, tostring
+
+from typing_extensions import assert_never
+
+from bbtc.backends.btcpp.conditions import ConditionWriter
+from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile
+from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
+from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE, condition_below, notes, template_label
+from bbtc.backends.btcpp.options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
+from bbtc.backends.btcpp.palette import node_model
+from bbtc.backends.exporter import Figures, Option, OptionValue
+from bbtc.backends.interface import action_symbol, guard_of, variable_symbol
+from bbtc.backends.shape import fit, written
+from bbtc.ground.condition import TRUE, And, Condition, Or, variables
+from bbtc.ground.task import GroundAction, Task, ground_name, split_name
+from bbtc.tree.deep import Deep, unwind
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlNode,
+    Node,
+    Tree,
+    tries_without_end,
+    walk,
+)
+
+ENGINE = "BehaviorTree.CPP"
+_DEEPEST_XML = 120  # levels of a BehaviorTree before a subtree gets one of its own; the engine takes 256
+
+
+@dataclass(frozen=True, slots=True)
+class BtcppExporter:
+    """Writes a tree as BehaviorTree.CPP v4 XML."""
+
+    name: str = "btcpp"
+    description: str = "BehaviorTree.CPP v4 XML with its TreeNodesModel"
+    suffix: str = ".xml"
+    options: tuple[Option, ...] = (
+        NODES,
+        NAMESPACE,
+        Option("model", True, "append the TreeNodesModel, which editors such as Groot2 read"),
+        Option("notes", True, "append the comment from which `bbtc import` reads the very same tree"),
+    )
+
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
+        """The XML. Raises :class:`BbtcError` for a tree that is too deep (BBT0705) and for a namespace
+        that is none (BBT0704)."""
+        del figures  # a file that runs has no place for them
+        namespace = namespace_of(self.name, options)
+        writer = _Writer(tree, profile_of(options), namespace)
+        document = writer.document(bool(options.get("model", True)), bool(options.get("notes", True)))
+        return xml_text(document)
+
+
+btcpp = BtcppExporter()
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where in a BehaviorTree the writer is: how deep, below which retry nodes, and which objects are
+    ports there."""
+
+    tree_title: str
+    level: int = 0
+    counters: tuple[str, ...] = ()
+    binding: Mapping[str, str] = field(default_factory=dict)
+    labels: Labels = field(default_factory=Labels)
+    template: Node | None = None
+
+    def down(self) -> _Place:
+        """One level further down."""
+        return replace(self, level=self.level + 1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Hoisted:
+    """A BehaviorTree to make, unless there is one like it: its place among the others, and what its id
+    is made of."""
+
+    order: int
+    title: str
+    seed: str
+    description: str
+
+
+class _Writer:
+    """Writes one document: BehaviorTrees are collected while the main tree is written."""
+
+    def __init__(self, tree: Tree, profile: Profile, namespace: str) -> None:
+        self.tree = tree
+        self.task: Task = tree.task
+        self.names = btcpp_names(tree, namespace)
+        self.profile: Profile = profile
+        self.tree_ids = TreeIds(self.names, self.task.problem)
+        prefix = entry_prefix(namespace)
+        self.idioms = Idioms(profile, prefix, f"{prefix}{entry_prefix(self.task.problem)}")
+        self.order: Iterator[int] = itertools.count()
+        self.parts: dict[bytes, tuple[int, Element]] = {}
+        self.action_trees: dict[tuple[str, bytes], Element] = {}
+        self.subtree_ports: dict[str, tuple[str, ...]] = {}
+        self.counters: Iterator[int] = itertools.count(1)
+        self.conditions = ConditionWriter(self.task, self.names, self.tree_ids, self.idioms)
+
+    def document(self, model: bool, with_notes: bool) -> Element:
+        """The whole document."""
+        main_id = self.tree_ids.main
+        document = Element("root", BTCPP_format="4", main_tree_to_execute=main_id)
+        main = SubElement(document, "BehaviorTree", ID=main_id)
+        main.set("_description", self._headline())
+        root = fit(self.tree.root, ENGINE)
+        main.append(self.idioms.until_blocked(unwind(self._written(root, _Place(self.task.problem)))))
+        document.extend(tree for _, tree in sorted(self.parts.values(), key=lambda part: part[0]))
+        document.extend(self.conditions.trees.values())
+        document.extend(self.action_trees.values())
+        if model:
+            ports = self.subtree_ports | self.conditions.ports
+            document.append(node_model(self.task, self.names, self.profile, ports))
+        if with_notes:
+            document.append(Comment(notes(self.tree, root, self.names)))
+        return document
+
+    def _headline(self) -> str:
+        task, claim = self.task, self.tree.success_probability
+        unbounded = " Nothing bounds how often it tries." if tries_without_end(self.tree.root) else ""
+        return shown(f"{task.domain}, {task.problem}: {CLAIM}{claim}.{unbounded} Made by bbtc.")
+
+    # --- nodes -------------------------------------------------------------------------------
+
+    def _written(self, node: Node, place: _Place) -> Deep[Element]:
+        if node.template is not None and place.template is not node:
+            templated: Element = yield self._template(node, node.template, place)
+            return templated
+        match node:
+            case ControlNode():
+                write = self._part if place.level >= _DEEPEST_XML else self._control
+                element: Element = yield write(node, place)
+            case ConditionNode():
+                element = self._condition(node, place)
+            case ActionNode():
+                element = self._action(node, place)
+            case _:
+                assert_never(node)
+        if node.reason and "_description" not in element.attrib:
+            element.set("_description", f"for {shown(node.reason)}")
+        return element
+
+    def _control(self, node: ControlNode, place: _Place) -> Deep[Element]:
+        if node.attempts is not None:
+            counter = self.idioms.counter(next(self.counters))
+            inside = replace(place.down(), counters=(*place.counters, counter))
+            child: Element = yield self._written(node.children[0], inside)
+            element = self.idioms.retry(counter, node.attempts, child)
+            if node.name:
+                element.set("name", shown(node.name))
+            return element
+        children: list[Element] = []
+        for each in node.children:
+            children.append((yield self._written(each, place.down())))  # noqa: PERF401
+        element = self.idioms.control(node.kind, children)
+        below = condition_below(self.task, node) if node.name else None
+        if below is not None and self.conditions.label(below, place.binding) == shown(node.name or ""):
+            return element  # with that name it would be one condition
+        if node.name:
+            element.set("name", shown(node.name))
+        elif element.tag == "Parallel":
+            element.set("name", SKIPPER_LABEL)
+        return element
+
+    def _part(self, node: ControlNode, place: _Place) -> Deep[Element]:
+        """A subtree in a BehaviorTree of its own, because it stands deep."""
+        hoisted = _Hoisted(next(self.order), f"{place.tree_title}Part", node.id, "")
+        inside = replace(place, tree_title=hoisted.title, level=0, labels=Labels())
+        content: Element = yield self._written(node, inside)
+        element = self._call(hoisted, content, tuple(place.binding.values()))
+        for port in place.binding.values():
+            element.set(port, f"{{{port}}}")
+        return element
+
+    def _template(self, node: Node, template: str, place: _Place) -> Deep[Element]:
+        """The expansion of a template: a BehaviorTree with its arguments as ports, which expansions that
+        differ in nothing else share."""
+        symbol, args = split_name(template)
+        hoisted = _Hoisted(next(self.order), symbol, template, f"{TEMPLATE} {shown(symbol)}")
+        binding = self._argument_ports(node, args)
+        inside = _Place(symbol, counters=place.counters, binding=binding, template=node)
+        content: Element = yield self._written(node, inside)
+        element = self._call(hoisted, content, tuple(binding.values()))
+        element.set("name", place.labels.unique(template_label(template)))
+        for arg, port in binding.items():
+            element.set(port, self.conditions.value(arg, place.binding))
+        return element
+
+    def _call(self, hoisted: _Hoisted, content: Element, ports: tuple[str, ...]) -> Element:
+        """A SubTree that calls a BehaviorTree with this content, which is made unless there is one."""
+        key = repr((hoisted.title, ports)).encode() + tostring(content)
+        if key not in self.parts:
+            tree = Element("BehaviorTree", ID=self.tree_ids.take(hoisted.title, seed=hoisted.seed))
+            if hoisted.description:
+                tree.set("_description", hoisted.description)
+            tree.append(content)
+            self.parts[key] = hoisted.order, tree
+            self.subtree_ports[tree.attrib["ID"]] = ports
+        return Element("SubTree", ID=self.parts[key][1].attrib["ID"])
+
+    def _argument_ports(self, root: Node, args: tuple[str, ...]) -> dict[str, str]:
+        """A port for every argument of a template that the leaves of its expansion name."""
+        uses: list[tuple[str, str]] = []
+        for node in walk(root):
+            read: list[int] = []
+            if isinstance(node, ConditionNode):
+                read = list(variables(written(self.task, node.condition)))
+            elif isinstance(node, ActionNode):
+                action = self.task.action_by_name[node.action]
+                uses += self._ports(action)
+                read = list(variables(guard_of(self.task, node) or TRUE))
+            for variable in (self.task.variables[index] for index in read):
+                parameters = self.names.interface.leaves[variable_symbol(variable)].parameters
+                uses += zip(parameters, variable.args, strict=True)
+        ports = ports_for((parameter, arg) for parameter, arg in uses if arg in args)
+        return {arg: ports[arg] for arg in dict.fromkeys(args) if arg in ports}
+
+    def _condition(self, node: ConditionNode, place: _Place) -> Element:
+        condition = written(self.task, node.condition)
+        label = shown(node.name) if node.name else None
+        compound = isinstance(condition, (And, Or))
+        if self.conditions.uses_register(condition) or (compound and label):
+            element = self.conditions.write_apart(condition, place.binding)
+            auto = self.conditions.label(condition, place.binding)
+            element.set("name", place.labels.unique(label or auto))
+            return element
+        element = self.conditions.write(condition, place.binding)
+        if label:
+            element.set("name", place.labels.unique(label) if element.tag == "SubTree" else label)
+        return element
+
+    def _action(self, node: ActionNode, place: _Place) -> Element:
+        action = self.task.action_by_name[node.action]
+        auto = ground_name(action.schema, tuple(place.binding.get(arg, arg) for arg in action.args))
+        label = shown(node.name or auto)
+        guard = guard_of(self.task, node)
+        if self.profile == "bbtc":
+            tag = self._leaf(action, place.binding)
+            needed = self._start_conditions(guard, place.binding, place.counters)
+            element = self.idioms.latch(tag, needed, node.latched)
+            element.set("name", label)
+            return element
+        tree_id = self._action_tree(node, action, guard, place.counters)
+        element = Element("SubTree", ID=tree_id, name=place.labels.unique(label))
+        for port, arg in self._ports(action):
+            if port in self.subtree_ports[tree_id]:
+                element.set(port, self.conditions.value(arg, place.binding))
+        return element
+
+    def _action_tree(
+        self, node: ActionNode, action: GroundAction, guard: Condition | None, counters: tuple[str, ...]
+    ) -> str:
+        """The id of the BehaviorTree that runs actions of a schema."""
+        # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
+        passed = {port: arg for port, arg in self._ports(action) if not is_numeric(arg)}
+        tag = Element(self.names.ids[action_symbol(action)])
+        for port, arg in self._ports(action):
+            tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
+        binding = {arg: port for port, arg in reversed(passed.items())}
+        needed = self._start_conditions(guard, binding, counters)
+        title = self.names.plain[action_symbol(action)]
+        title += ("Once" if node.latched else "Again") + ("WhenReady" if needed else "")
+        write = self.idioms.latched if node.latched else self.idioms.unlatched
+        content = write(tag, needed)
+        key = (title, tostring(content))
+        if key not in self.action_trees:
+            tree_id = self.tree_ids.take(title, seed=repr(key))
+            self.action_trees[key] = Element("BehaviorTree", ID=tree_id)
+            self.action_trees[key].append(content)
+            self.subtree_ports[tree_id] = tuple(passed)
+        return self.action_trees[key].attrib["ID"]
+
+    def _start_conditions(
+        self, guard: Condition | None, binding: Mapping[str, str], counters: tuple[str, ...]
+    ) -> list[Element]:
+        read = None if guard is None else self.conditions.write(written(self.task, guard), binding)
+        return self.idioms.start_conditions(read, counters)
+
+    def _leaf(self, action: GroundAction, binding: Mapping[str, str]) -> Element:
+        element = Element(self.names.ids[action_symbol(action)])
+        for port, arg in self._ports(action):
+            element.set(port, self.conditions.value(arg, binding))
+        return element
+
+    def _ports(self, action: GroundAction) -> list[tuple[str, str]]:
+        parameters = self.names.interface.leaves[action_symbol(action)].parameters
+        return list(zip(parameters, action.args, strict=True))

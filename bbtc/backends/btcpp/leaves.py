@@ -1,0 +1,302 @@
+"""The leaves of a BehaviorTree.CPP tree as C++: a class per condition and action, and the interface of the
+robot that they ask."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bbtc.backends.btcpp import cppcode
+from bbtc.backends.btcpp.names import BtcppNames
+from bbtc.backends.btcpp.palette import port_text, signature
+from bbtc.backends.interface import Leaf
+from bbtc.ground.task import Task
+
+_ROBOT = """\
+// What the tree needs of a robot. Made by bbtc; no need to edit it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <behaviortree_cpp/basic_types.h>
+
+namespace ROBOT_TREE {
+
+/// A condition answers at once, with nothing where it is unknown. An action is called in every tick while it
+/// runs, and answers at once with RUNNING; with SUCCESS when the conditions show what it did; with FAILURE
+/// when the robot could not do it. It is cancelled when it is no longer wanted; where another takes its
+/// place, in the same tick, but perhaps after the first call of the other.
+class Robot {
+ public:
+  virtual ~Robot() = default;
+"""
+
+ACCESS = """\
+/// The id of the tree to run.
+inline constexpr const char* kMainTree = MAIN_TREE;
+
+/// Tick a tree until it ends, with a pause between ticks. `ready` is asked before each tick; where it says
+/// no, the tick is left out. SIGINT (Ctrl-C) and SIGTERM end that, too: the action that runs is cancelled,
+/// and the status is RUNNING.
+inline BT::NodeStatus run(BT::Tree& tree, std::chrono::milliseconds pause,
+                          const std::function<bool()>& ready = [] { return true; }) {
+  static volatile std::sig_atomic_t interrupted = 0;
+  interrupted = 0;
+  const auto interrupt = [](int) { interrupted = 1; };
+  const auto on_interrupt = std::signal(SIGINT, interrupt);
+  const auto on_terminate = std::signal(SIGTERM, interrupt);
+  BT::NodeStatus status = BT::NodeStatus::RUNNING;
+  while (interrupted == 0) {
+    if (ready()) {
+      status = tree.tickOnce();
+    }
+    if (status != BT::NodeStatus::RUNNING) {
+      break;
+    }
+    tree.sleep(pause);
+  }
+  if (status == BT::NodeStatus::RUNNING) {
+    tree.haltTree();
+  }
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_terminate);
+  return status;
+}
+
+/// The value of a port.
+inline std::string argument(const BT::TreeNode& node, const std::string& port) {
+  const auto value = node.getInput<std::string>(port);
+  if (!value) {
+    throw BT::RuntimeError(node.name(), ": ", value.error());
+  }
+  return value.value();
+}
+"""
+"""C++ that every flavour of the leaves begins with."""
+
+_LEAVES = (
+    """\
+// The leaves of the tree: a class for each condition and action. Made by bbtc; no need to edit it.
+#pragma once
+
+#include <chrono>
+#include <csignal>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <behaviortree_cpp/action_node.h>
+#include <behaviortree_cpp/bt_factory.h>
+#include <behaviortree_cpp/condition_node.h>
+
+#include "robot.hpp"
+
+namespace ROBOT_TREE {
+
+"""
+    + ACCESS
+    + """
+/// SUCCESS, FAILURE or RUNNING for true, false or unknown.
+inline BT::NodeStatus statusOf(std::optional<bool> value) {
+  return !value ? BT::NodeStatus::RUNNING : *value ? BT::NodeStatus::SUCCESS : BT::NodeStatus::FAILURE;
+}
+"""
+)
+
+_STUB = """\
+// A robot to start from: copy this file to my_robot.hpp, and fill it in there.
+#pragma once
+
+#include <iostream>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include "robot.hpp"
+
+namespace ROBOT_TREE {
+
+class MyRobot : public Robot {
+ public:
+  MyRobot() = default;
+"""
+
+_STUB_END = """
+ private:
+  /// Tells, once, of a condition that is to be written.
+  template <typename... Words>
+  void toDo(const Words&... words) {
+    std::ostringstream told;
+    (told << ... << words);
+    if (told_.insert(told.str()).second) {
+      std::cerr << "to do: " << told.str() << '\\n';
+    }
+  }
+
+  std::set<std::string> told_;
+};
+"""
+
+_CONDITION = """\
+class NAME : public BT::ConditionNode {
+ public:
+  NAME(const std::string& name, const BT::NodeConfig& config, Robot* robot)
+      : BT::ConditionNode(name, config), robot_(robot) {}
+
+  static BT::PortsList providedPorts() { return PORTS; }
+
+ private:
+  BT::NodeStatus tick() override { return statusOf(robot_->METHOD(ARGUMENTS)); }
+
+  Robot* robot_;
+};
+"""
+
+_ACTION = """\
+class NAME : public BT::StatefulActionNode {
+ public:
+  NAME(const std::string& name, const BT::NodeConfig& config, Robot* robot)
+      : BT::StatefulActionNode(name, config), robot_(robot) {}
+
+  static BT::PortsList providedPorts() { return PORTS; }
+
+ private:
+  BT::NodeStatus onStart() override { return onRunning(); }
+  BT::NodeStatus onRunning() override { return robot_->METHOD(ARGUMENTS); }
+  void onHalted() override { robot_->CANCEL(ARGUMENTS); }
+
+  Robot* robot_;
+};
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What a program is called: its package, the C++ namespace of its leaves, and the tree it runs; and
+    whether that tree has our control nodes."""
+
+    package: str
+    space: str
+    main_tree: str
+    our_nodes: bool
+
+
+class LeafWriter:
+    """Writes the C++ of the leaves. Class and method names are ids with a word added, so that none is a
+    keyword or a macro."""
+
+    def __init__(self, task: Task, names: BtcppNames, program: Program) -> None:
+        self._task = task
+        self._program = program
+        self._space = program.space
+        self._names = names
+
+    def class_name(self, leaf: Leaf) -> str:
+        """``SeenCondition``, ``DetectAction``."""
+        return f"{self._names.plain[leaf.symbol]}{'Action' if leaf.symbol.kind == 'action' else 'Condition'}"
+
+    def method(self, leaf: Leaf) -> str:
+        """``isSeen``, ``doDetect``."""
+        return f"{'do' if leaf.symbol.kind == 'action' else 'is'}{self._names.plain[leaf.symbol]}"
+
+    def cancel(self, leaf: Leaf) -> str:
+        """``cancelDetect``."""
+        return f"cancel{self._names.plain[leaf.symbol]}"
+
+    def declaration(self, leaf: Leaf, method: str, *, named: bool = True) -> str:
+        """``std::optional<bool> isSeen(const std::string& item)``; names as comments where unused."""
+        if method == self.cancel(leaf):
+            result = "void"
+        elif leaf.symbol.kind == "action":
+            result = "BT::NodeStatus"
+        else:
+            result = "std::optional<bool>" if leaf.three_valued else "bool"
+        listed = [p if named else f"/*{p}*/" for p in cppcode.parameters(leaf.parameters)]
+        return f"{result} {method}({', '.join(f'const std::string& {p}' for p in listed)})"
+
+    def leaves(self) -> list[Leaf]:
+        """Conditions, then actions."""
+        return [*self._names.interface.conditions, *self._names.interface.actions]
+
+    def robot(self) -> str:
+        """``robot.hpp``: the interface of the robot."""
+        lines = [self._open(_ROBOT)]
+        for leaf in self.leaves():
+            said = cppcode.comment(signature(leaf))
+            if leaf.symbol.kind == "action":
+                lines += ["", f"  /// Start or continue {said}."]
+                lines += [f"  virtual {self.declaration(leaf, self.method(leaf))} = 0;"]
+                lines += [f"  virtual {self.declaration(leaf, self.cancel(leaf), named=False)} {{}}"]
+            else:
+                unknown = "; nothing where that is unknown" if leaf.three_valued else ""
+                lines += ["", f"  /// Whether {said} holds{unknown}."]
+                lines += [f"  virtual {self.declaration(leaf, self.method(leaf))} = 0;"]
+        return "\n".join([*lines, "};", "", *self._close()])
+
+    def header(self) -> str:
+        """``leaves.hpp``: the classes, and the function that registers them."""
+        words = {"ROBOT_TREE": self._space, "MAIN_TREE": cppcode.literal(self._program.main_tree)}
+        head = _LEAVES
+        if self._program.our_nodes:
+            head = head.replace('#include "robot.hpp"', '#include "bbtc_nodes.hpp"\n#include "robot.hpp"')
+        blocks = [cppcode.fill(head, **words), *(self._class(leaf) for leaf in self.leaves())]
+        body = [
+            f"  factory.registerNodeType<{self.class_name(leaf)}>"
+            f"({cppcode.literal(self._names.ids[leaf.symbol])}, robot);"
+            for leaf in self.leaves()
+        ]
+        if self._program.our_nodes:
+            body.append("  bbtc::registerNodes(factory);")
+        register = [
+            "/// Make a factory know every node of the tree. The robot must outlive its trees.",
+            "inline void registerLeaves(BT::BehaviorTreeFactory& factory, Robot& the_robot) {",
+            "  Robot* robot = &the_robot;",
+            *body,
+            "}",
+            "",
+            *self._close(),
+        ]
+        return "\n".join([*blocks, "\n".join(register)])
+
+    def stub(self) -> str:
+        """``robot_stub.hpp``: a robot that knows and can do nothing yet."""
+        lines = [self._open(_STUB)]
+        for leaf in self.leaves():
+            if leaf.symbol.kind == "action":
+                # Said aloud: a tree that tries without end would else be silent without end.
+                words = [cppcode.literal(f"to do: {self.method(leaf)}")]
+                words += (f"' ' << {parameter}" for parameter in cppcode.parameters(leaf.parameters))
+                body = [f"std::cerr << {' << '.join(words)} << '\\n';", "return BT::NodeStatus::FAILURE;"]
+                declared = self.declaration(leaf, self.method(leaf))
+            else:
+                # Else a tree whose guards it blocks would end without a word.
+                said, answer = ("unknown", "std::nullopt") if leaf.three_valued else ("false", "false")
+                words = [cppcode.literal(self.method(leaf))]
+                words += (f"' ', {parameter}" for parameter in cppcode.parameters(leaf.parameters))
+                words.append(cppcode.literal(f", {said} until then"))
+                body = [f"toDo({', '.join(words)});", f"return {answer};"]
+                declared = self.declaration(leaf, self.method(leaf))
+            lines += ["", f"  {declared} override {{", *(f"    {line}" for line in body), "  }"]
+        return "\n".join([*lines, _STUB_END, *self._close()])
+
+    def _class(self, leaf: Leaf) -> str:
+        ports = [
+            f"BT::InputPort<std::string>({cppcode.literal(port)}, {cppcode.literal(text)})"
+            for port, text in zip(leaf.parameters, port_text(self._task, self._names, leaf), strict=True)
+        ]
+        told = f"/// {cppcode.comment(signature(leaf))}\n"
+        return told + cppcode.fill(
+            _ACTION if leaf.symbol.kind == "action" else _CONDITION,
+            NAME=self.class_name(leaf),
+            METHOD=self.method(leaf),
+            CANCEL=self.cancel(leaf),
+            ARGUMENTS=", ".join(f"argument(*this, {cppcode.literal(port)})" for port in leaf.parameters),
+            PORTS=f"{{{', '.join(ports)}}}",
+        )
+
+    def _open(self, text: str) -> str:
+        return cppcode.fill(text, ROBOT_TREE=self._space).rstrip()
+
+    def _close(self) -> list[str]:
+        return [f"}}  // namespace {self._space}", ""]

@@ -1,0 +1,1 @@
+"""BehaviorTree.CPP XML back into trees, also where people edited it."""

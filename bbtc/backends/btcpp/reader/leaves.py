@@ -1,0 +1,154 @@
+"""Which variable or action of a task a leaf of a BehaviorTree.CPP file stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from bbtc.artefacts.cursor import clip
+from bbtc.backends.btcpp.names import objects_of
+from bbtc.backends.btcpp.reader.layout import is_port
+from bbtc.backends.btcpp.reader.patterns import tag_of
+from bbtc.backends.btcpp.reader.unread import Unread, Unreadable, unreadable
+from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.interface import action_symbol, parameters_of, variable_symbol
+from bbtc.backends.names import Kind, Symbol, camel, port_values, possible_identifiers
+from bbtc.ground.task import Task, ground_name
+
+
+@dataclass(frozen=True, slots=True)
+class FileNames:
+    """The names in a file: leaves by id, and objects by their value in ports."""
+
+    namespace: str
+    symbols: Mapping[str, Symbol]
+    objects: Mapping[str, str]
+
+
+class Leaves:
+    """Reads leaves on a task. ``names`` are those that the file itself explains; others are taken as an
+    export would write them; ``unread`` is told what has been read."""
+
+    def __init__(self, task: Task, document: XmlDocument, names: FileNames, unread: Unread) -> None:
+        self._task = task
+        self._unread = unread
+        self._document = document
+        self._names = names
+        symbols = {variable_symbol(variable) for variable in task.variables}
+        symbols |= {action_symbol(action) for action in task.actions}
+        self._symbols = sorted(symbols)
+        self._possible: dict[str, dict[Symbol, int]] = {}
+        prefix = camel(names.namespace) if names.namespace else ""
+        for symbol in self._symbols:
+            for rank, name in enumerate(possible_identifiers(symbol, "camel")):
+                self._possible.setdefault(f"{prefix}{name}", {}).setdefault(symbol, rank)
+        values = port_values(objects_of(task))
+        self._objects = {value: name for name, value in values.items()} | dict(names.objects)
+
+    def object_of(self, value: str) -> str | None:
+        """The object that a value of a port stands for; None if none does."""
+        return self._objects.get(value)
+
+    def is_action(self, element: XmlElement) -> bool:
+        """Whether an id can only be that of an action."""
+        found = self._found(element)
+        return bool(found) and all(symbol.kind == "action" for symbol in found)
+
+    def is_leaf(self, element: XmlElement) -> bool:
+        """Whether an id is that of a predicate or action."""
+        return bool(self._found(element))
+
+    def variable(self, element: XmlElement, ports: Mapping[str, str]) -> int:
+        """The variable that a condition leaf reads. ``ports`` are the values of the ports of the
+        BehaviorTree around it. Raises :class:`Unreadable`."""
+        name = self._ground(element, ports, "predicate")
+        if name not in self._task.variable_index:
+            raise self._unknown(element, "variable", name, list(self._task.variable_index))
+        return self._task.variable_index[name]
+
+    def action(self, element: XmlElement, ports: Mapping[str, str]) -> str:
+        """The action that an action leaf runs. Raises :class:`Unreadable`."""
+        name = self._ground(element, ports, "action")
+        if name not in self._task.action_by_name:
+            raise self._unknown(element, "action", name, list(self._task.action_by_name))
+        return name
+
+    def value(self, element: XmlElement, attribute: str, ports: Mapping[str, str]) -> str:
+        """The value of an attribute, ports looked up. Raises :class:`Unreadable`."""
+        value = self.resolved(element.attributes[attribute], attribute, ports)
+        if value is None:
+            message = f"the port '{clip(element.attributes[attribute])}' has no value here"
+            raise unreadable(self._document, element, "BBT0606", message, attribute=attribute)
+        return value
+
+    @staticmethod
+    def resolved(value: str, attribute: str, ports: Mapping[str, str]) -> str | None:
+        """A text as the value of an attribute, ports looked up; None for a port without a value."""
+        if value == "{=}":
+            value = f"{{{attribute}}}"
+        if not (value.startswith("{") and value.endswith("}")):
+            return value
+        return ports.get(value[1:-1])
+
+    def _ground(self, element: XmlElement, ports: Mapping[str, str], kind: Kind) -> str:
+        symbol = self._symbol(element, kind)
+        wanted = parameters_of(self._task, symbol)
+        given = [key for key in element.attributes if is_port(key)]
+        self._unread.took(element, *given)
+        for port in wanted:
+            if port not in given:
+                message = f"'{clip(tag_of(element))}' needs the port '{port}'"
+                other = next((key for key in given if key not in wanted), None)
+                hint = f"it has no port '{clip(other)}'" if other is not None else None
+                raise unreadable(self._document, element, "BBT0603", message, attribute=other, hint=hint)
+        for port in given:
+            if port not in wanted:
+                message = f"'{clip(tag_of(element))}' has no port '{clip(port)}'"
+                hint = f"its ports: {', '.join(wanted)}" if wanted else "it has no ports"
+                raise unreadable(self._document, element, "BBT0603", message, attribute=port, hint=hint)
+        return ground_name(symbol.name, tuple(self._argument(element, port, ports) for port in wanted))
+
+    def _argument(self, element: XmlElement, port: str, ports: Mapping[str, str]) -> str:
+        value = self.value(element, port, ports)
+        found = self._objects.get(value)
+        if found is None:
+            near = get_close_matches(value[:60], list(self._objects)[:2000], n=1)
+            hint = f"did you mean '{near[0]}'?" if near else None
+            message = f"no object of the task is called '{clip(value)}'"
+            raise unreadable(self._document, element, "BBT0606", message, attribute=port, hint=hint)
+        return found
+
+    def _symbol(self, element: XmlElement, kind: Kind) -> Symbol:
+        found = [symbol for symbol in self._found(element) if symbol.kind == kind]
+        word = "action" if kind == "action" else "condition"
+        if not found:
+            near = get_close_matches(tag_of(element)[:60], list(self._possible)[:2000], n=1)
+            hint = f"did you mean '{near[0]}'?" if near else None
+            message = f"no {word} of the task is written as '{clip(tag_of(element))}'"
+            raise unreadable(self._document, element, "BBT0606", message, hint=hint)
+        if len(found) > 1:
+            listed = ", ".join(f"{symbol.name}/{symbol.arity}" for symbol in found)
+            message = f"'{clip(tag_of(element))}' may be each of {listed}"
+            hint = "export the tree anew, with the notes that tell"
+            raise unreadable(self._document, element, "BBT0606", message, hint=hint)
+        return found[0]
+
+    def _found(self, element: XmlElement) -> list[Symbol]:
+        """The symbols an id may stand for; the notes of the file decide, then the usual spelling."""
+        name = tag_of(element)
+        if name in self._names.symbols:
+            return [self._names.symbols[name]]
+        ranks = self._possible.get(name, {})
+        best: list[Symbol] = []
+        for kind in ("predicate", "action"):
+            of_kind = {symbol: rank for symbol, rank in ranks.items() if symbol.kind == kind}
+            best += [symbol for symbol, rank in of_kind.items() if rank == min(of_kind.values())]
+        return best
+
+    def _unknown(self, element: XmlElement, what: str, name: str, known: list[str]) -> Unreadable:
+        near = get_close_matches(name[:60], known[:2000], n=1)
+        hint = f"did you mean '{near[0]}'?" if near else None
+        return unreadable(
+            self._document, element, "BBT0606", f"the task has no {what} '{clip(name)}'", hint=hint
+        )

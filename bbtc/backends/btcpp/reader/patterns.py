@@ -1,0 +1,392 @@
+"""The idioms of exported BehaviorTree.CPP files (:mod:`bbtc.backends.btcpp.idioms`), recognised again.
+
+A shape says which elements an idiom is made of and which values their attributes have. An element with the
+elements of a shape stands for nothing else, so a value that differs is wrong, and named; an attribute that
+the shape lacks is nobody's, which :mod:`bbtc.backends.btcpp.reader.unread` reports.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.backends.btcpp.idioms import LATCH, SKIPPER
+from bbtc.backends.btcpp.reader.xmltext import XmlElement
+
+_KINDS = ("Action", "Condition", "Control", "Decorator")
+_COUNTER = r"@[A-Za-z_]\w*"
+_LEFT = re.compile(rf"{_COUNTER} > 0(?: && {_COUNTER} > 0)*")
+_USED = re.compile(rf"{_COUNTER} -= 1(?:; {_COUNTER} -= 1)*")
+_WORD = re.compile(_COUNTER)
+_NAME = re.compile(r"[A-Za-z_]\w*")
+_BOOLEANS = {word: value for value in (True, False) for word in (str(value), str(value).lower())}
+_BOOLEANS |= {"TRUE": True, "FALSE": False, "1": True, "0": False}
+
+
+def tag_of(element: XmlElement) -> str:
+    """The id of a node; ``<Action ID="Detect"/>`` is another spelling of ``<Detect/>``."""
+    if is_long(element):
+        return element.attributes["ID"]
+    return element.tag
+
+
+def is_long(element: XmlElement) -> bool:
+    """Whether an element names its kind, and its id in an attribute."""
+    return element.tag in _KINDS and "ID" in element.attributes
+
+
+def has(element: XmlElement, tag: str, children: int | None = None) -> bool:
+    """Whether an element has this tag and this many children."""
+    return tag_of(element) == tag and (children is None or len(element.children) == children)
+
+
+def boolean_of(text: str) -> bool | None:
+    """The truth value that the engine reads in an attribute; None if it reads none."""
+    return _BOOLEANS.get(text)
+
+
+def is_skipper(element: XmlElement) -> bool:
+    """Our node Skipper, or a Parallel that ends with the first child to end."""
+    counts = (element.attributes.get("success_count"), element.attributes.get("failure_count"))
+    return has(element, SKIPPER) or (has(element, "Parallel") and counts == ("1", "1"))
+
+
+# --- shapes ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """Values of an attribute. Groups of the pattern have one text in all of a shape; ``example`` is shown to
+    a person whose value does not fit."""
+
+    pattern: re.Pattern[str]
+    example: str
+
+
+Value: TypeAlias = str | Pattern
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """Any element, with these attributes among others."""
+
+    name: str
+    attributes: Mapping[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Holes:
+    """Any number of elements, before all others."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """An element, its attributes and its children. The tag ``Skipper`` stands for a Parallel, too."""
+
+    tag: str
+    attributes: Mapping[str, Value]
+    children: tuple[Shape | Hole | Holes, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """What was found in the holes of a shape, and the texts of its groups; the elements and attributes that
+    the shape has, and those attributes that have another value, with what they should have."""
+
+    shape: Shape | None = None
+    parts: dict[str, list[XmlElement]] = field(default_factory=dict)
+    texts: dict[str, str] = field(default_factory=dict)
+    read: list[tuple[XmlElement, tuple[str, ...]]] = field(default_factory=list)
+    wrong: list[tuple[XmlElement, str, str]] = field(default_factory=list)
+
+    def part(self, name: str) -> XmlElement:
+        """The element in a hole."""
+        (element,) = self.parts[name]
+        return element
+
+    def attribute(self, element: XmlElement, name: str, wanted: Value) -> None:
+        """Compare an attribute with the value it should have."""
+        value = element.attributes.get(name)
+        match wanted:
+            case str():
+                fits, example = value == wanted, wanted
+            case Pattern(pattern, example):
+                found = pattern.fullmatch(value or "")
+                groups = {} if found is None else found.groupdict()
+                fits = found is not None and all(
+                    self.texts.setdefault(group, text) == text for group, text in groups.items()
+                )
+            case _:
+                assert_never(wanted)
+        self.read.append((element, (name,)))
+        if not fits:
+            self.wrong.append((element, name, example))
+
+
+_ONE_OF = {"success_count": "1", "failure_count": "1"}
+
+
+def match(shape: Shape, element: XmlElement) -> Match | None:
+    """An element as a shape; None if it has other elements."""
+    found = Match(shape)
+    return found if _fits(shape, element, found) else None
+
+
+def _fits(shape: Shape, element: XmlElement, found: Match) -> bool:
+    attributes = shape.attributes
+    if shape.tag == SKIPPER and has(element, "Parallel"):
+        attributes = {**attributes, **_ONE_OF}
+    elif not has(element, shape.tag):
+        return False
+    children, wanted = element.children, shape.children
+    if wanted and isinstance(wanted[0], Holes) and len(children) >= len(wanted) - 1:
+        many = len(children) - len(wanted) + 1
+        found.parts[wanted[0].name] = children[:many]
+        children, wanted = children[many:], wanted[1:]
+    if len(children) != len(wanted):
+        return False
+    found.read.append((element, ()))
+    for name, value in attributes.items():
+        found.attribute(element, name, value)
+    return all(_fits_in(part, child, found) for part, child in zip(wanted, children, strict=True))
+
+
+def _fits_in(part: Shape | Hole | Holes, child: XmlElement, found: Match) -> bool:
+    match part:
+        case Shape():
+            return _fits(part, child, found)
+        case Hole(name, attributes):
+            found.parts[name] = [child]
+            for key, value in attributes.items():
+                found.attribute(child, key, value)
+            return True
+        case Holes():
+            raise ValueError("many elements stand first in a shape")
+        case _:
+            assert_never(part)
+
+
+def _script(code: Value) -> Shape:
+    return Shape("Script", {"code": code})
+
+
+def _running(script: Value, leaf: Hole) -> Shape:
+    kept = Shape("KeepRunningUntilFailure", {}, (Shape("ForceSuccess", {}, (leaf,)),))
+    return Shape("ReactiveSequence", {}, (_script(script), kept))
+
+
+_RAISED = Pattern(re.compile(rf"@(?P<flag>{_NAME.pattern}) := true"), "@acting := true")
+_RAISED_AND_STARTED = Pattern(
+    re.compile(rf"@(?P<flag>{_NAME.pattern}) := true; _started := 'yes'"),
+    "@acting := true; _started := 'yes'",
+)
+_SUCCESS, _FAILURE = Shape("AlwaysSuccess", {}), Shape("AlwaysFailure", {})
+_EVENTS = ("_onSuccess", "_onFailure", "_onHalted")
+
+UNTIL_BLOCKED = Shape(
+    SKIPPER,
+    {},
+    (
+        Shape(
+            "ReactiveSequence",
+            {},
+            (
+                _script(Pattern(re.compile(rf"@(?P<flag>{_NAME.pattern}) := false"), "@acting := false")),
+                Hole("tree"),
+            ),
+        ),
+        Shape(
+            "Precondition",
+            {"if": Pattern(re.compile(rf"!@(?P<flag>{_NAME.pattern})"), "!@acting"), "else": "RUNNING"},
+            (_FAILURE,),
+        ),
+    ),
+)
+"""The tree, and FAILURE where it is running and no action is."""
+
+RETRY = Shape(
+    "ReactiveSequence",
+    {},
+    (
+        Shape(
+            "RunOnce",
+            {"then_skip": "false"},
+            (
+                _script(
+                    Pattern(re.compile(rf"(?P<counter>{_COUNTER}) := (?P<attempts>[0-9]{{1,6}})"), "@x := 3")
+                ),
+            ),
+        ),
+        Hole("child"),
+    ),
+)
+"""A node below which every action uses up an attempt."""
+
+_LATCHED = dict(
+    zip(_EVENTS, ("_latch := 'success'", "_latch := 'failure'", "_latch := 'success'"), strict=True)
+)
+_RUN_LATCHED = _running(_RAISED, Hole("leaf", _LATCHED))
+_RUN_STARTED = _running(_RAISED_AND_STARTED, Hole("leaf", dict.fromkeys(_EVENTS, "_started := 'no'")))
+_SWITCH = {"variable": "{_latch}", "case_1": "success", "case_2": "failure"}
+_ACTIONS: tuple[tuple[Shape, str | None], ...] = (
+    (Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, _RUN_LATCHED)), "_latch"),
+    (
+        Shape(
+            "Switch2", _SWITCH, (_SUCCESS, _FAILURE, Shape("Sequence", {}, (Holes("needed"), _RUN_LATCHED)))
+        ),
+        "_latch",
+    ),
+    (_running(_RAISED, Hole("leaf")), None),
+    (
+        Shape(
+            "ReactiveSequence",
+            {},
+            (
+                Shape(
+                    "Switch2",
+                    {"variable": "{_started}", "case_1": "yes", "case_2": "never"},
+                    (_SUCCESS, _FAILURE, Hole("ready")),
+                ),
+                *_RUN_STARTED.children,
+            ),
+        ),
+        "_started",
+    ),
+)
+
+KNOWN = Shape(SKIPPER, {}, (Shape("ForceSuccess", {}, (Hole("leaf"),)), _FAILURE))
+UNKNOWN = Shape(SKIPPER, {}, (Shape("ForceFailure", {}, (Hole("leaf"),)), _SUCCESS))
+"""Tests for whether what a leaf reads is known, or unknown."""
+
+REGISTER = Shape(
+    "ReactiveSequence",
+    {},
+    (
+        Shape(
+            SKIPPER,
+            {},
+            (
+                Shape(
+                    "ForceSuccess",
+                    {},
+                    (
+                        Hole(
+                            "condition", {"_onSuccess": "_value := 'true'", "_onFailure": "_value := 'false'"}
+                        ),
+                    ),
+                ),
+                _script("_value := 'unknown'"),
+            ),
+        ),
+        Shape(
+            "Precondition",
+            {"if": "_value != 'unknown'", "else": "RUNNING"},
+            (Shape("ScriptCondition", {"code": "_value == 'true'"}),),
+        ),
+    ),
+)
+"""A Parallel whose result an entry of the blackboard holds."""
+
+
+def _tags(shape: Shape) -> Iterator[str]:
+    yield shape.tag
+    for child in shape.children:
+        if isinstance(child, Shape):
+            yield from _tags(child)
+
+
+READ = frozenset(
+    ("ReactiveSequence", "ReactiveFallback", "Parallel", "SubTree", "Inverter", "ScriptCondition", LATCH)
+).union(
+    *(
+        _tags(shape)
+        for shape in (UNTIL_BLOCKED, RETRY, KNOWN, UNKNOWN, REGISTER, *(shape for shape, _ in _ACTIONS))
+    )
+)
+"""The nodes that mean something in some place, besides the leaves of a task."""
+
+
+# --- actions ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ActionParts:
+    """What an action idiom is made of: its leaf, what must be true before it starts, the counters of
+    attempts it uses, whether it keeps its status, the flag that tells that it runs, the entry of the
+    blackboard that it remembers its state in, and how it was recognised."""
+
+    leaf: XmlElement
+    guards: tuple[XmlElement, ...]
+    counters: tuple[str, ...]
+    latched: bool
+    flag: str
+    entry: str | None
+    found: Match
+
+
+def action_of(element: XmlElement) -> ActionParts | None:
+    """The parts of an action idiom; None if this is none."""
+    if has(element, LATCH) and element.children:
+        return _latch(element)
+    for shape, entry in _ACTIONS:
+        found = match(shape, element)
+        if found is None:
+            continue
+        needed: Sequence[XmlElement] = found.parts.get("needed", [])
+        if "ready" in found.parts:
+            needed = _needed(found.part("ready"), found)
+        leaf, flag = found.part("leaf"), found.texts.get("flag", "")
+        return _parts(leaf, needed, found, latched=entry == "_latch", flag=flag, entry=entry)
+    return None
+
+
+def _latch(element: XmlElement) -> ActionParts:
+    found = Match(read=[(element, ())])
+    keep = boolean_of(element.attributes.get("keep", "true"))
+    flag = element.attributes.get("flag", "acting")
+    for name, fits, example in (
+        ("keep", keep is not None, "true"),
+        ("flag", _NAME.fullmatch(flag) is not None, "acting"),
+    ):
+        if name in element.attributes:
+            found.read.append((element, (name,)))
+            if not fits:
+                found.wrong.append((element, name, example))
+    *needed, leaf = element.children
+    return _parts(leaf, needed, found, latched=keep is not False, flag=flag, entry=None)
+
+
+def _needed(ready: XmlElement, found: Match) -> Sequence[XmlElement]:
+    """What must succeed before an action starts: several nodes if the last of them uses up an attempt."""
+    if has(ready, "ReactiveSequence") and ready.children and has(ready.children[-1], "Script"):
+        found.read.append((ready, ()))
+        return ready.children
+    return [ready]
+
+
+def _parts(
+    leaf: XmlElement,
+    needed: Sequence[XmlElement],
+    found: Match,
+    *,
+    latched: bool,
+    flag: str,
+    entry: str | None,
+) -> ActionParts:
+    """Splits what stands before an action into guards and the counting of attempts."""
+    guards, counters = tuple(needed), tuple[str, ...]()
+    if len(needed) >= 2 and has(needed[-2], "ScriptCondition", 0) and has(needed[-1], "Script", 0):
+        left, used = (part.attributes.get("code", "") for part in needed[-2:])
+        guards, counters = tuple(needed[:-2]), tuple(_WORD.findall(left))
+        found.read.extend((part, ("code",)) for part in needed[-2:])
+        if _LEFT.fullmatch(left) is None:
+            found.wrong.append((needed[-2], "code", "@x > 0"))
+        elif _USED.fullmatch(used) is None or tuple(_WORD.findall(used)) != counters:
+            found.wrong.append((needed[-1], "code", "; ".join(f"{counter} -= 1" for counter in counters)))
+    return ActionParts(leaf, guards, counters, latched, flag, entry, found)

@@ -1,0 +1,93 @@
+"""The leaves that a user of an exported tree implements: one per predicate and action schema.
+
+Every executable back-end shows the same leaves with the same parameter names.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from bbtc.backends.names import Symbol, parameter_names
+from bbtc.backends.shape import normal
+from bbtc.ground.condition import TRUE, Condition, variables
+from bbtc.ground.task import GroundAction, Task, Variable
+from bbtc.tree.nodes import ActionNode, ConditionNode, Node, walk
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """A condition or action to implement. ``three_valued`` conditions can be unknown."""
+
+    symbol: Symbol
+    parameters: tuple[str, ...]
+    three_valued: bool = False
+
+
+@dataclass(frozen=True)
+class Interface:
+    """The leaves a tree uses, sorted by name; ``reads`` are the variables that conditions and guards read."""
+
+    conditions: tuple[Leaf, ...]
+    actions: tuple[Leaf, ...]
+    reads: tuple[int, ...] = ()
+
+    @cached_property
+    def leaves(self) -> dict[Symbol, Leaf]:
+        """Every leaf by its symbol."""
+        return {leaf.symbol: leaf for leaf in (*self.conditions, *self.actions)}
+
+
+def variable_symbol(variable: Variable) -> Symbol:
+    """The condition leaf that reads a variable."""
+    return Symbol("predicate", variable.predicate, len(variable.args))
+
+
+def action_symbol(action: GroundAction) -> Symbol:
+    """The action leaf that runs a ground action."""
+    return Symbol("action", action.schema, len(action.args))
+
+
+def guard_of(task: Task, node: ActionNode) -> Condition | None:
+    """What must be true for the node to start its action, in normal form; None if nothing."""
+    if not node.guarded:
+        return None
+    guard = normal(task, task.action_by_name[node.action].precondition)
+    return None if guard == TRUE else guard
+
+
+def interface_of(task: Task, root: Node) -> Interface:
+    """The interface of a tree: what its conditions, guards and actions refer to."""
+    read: dict[int, None] = {}
+    actions: dict[Symbol, None] = {}
+    for node in walk(root):
+        if isinstance(node, ConditionNode):
+            read.update(dict.fromkeys(variables(normal(task, node.condition))))
+        elif isinstance(node, ActionNode):
+            actions[action_symbol(task.action_by_name[node.action])] = None
+            guard = guard_of(task, node)
+            if guard is not None:
+                read.update(dict.fromkeys(variables(guard)))
+    unknowable: dict[Symbol, bool] = {}
+    for index in read:
+        variable = task.variables[index]
+        symbol = variable_symbol(variable)
+        unknowable[symbol] = unknowable.get(symbol, False) or variable.three_valued
+    return Interface(
+        tuple(Leaf(s, parameters_of(task, s), unknowable[s]) for s in sorted(unknowable)),
+        tuple(Leaf(s, parameters_of(task, s)) for s in sorted(actions)),
+        tuple(sorted(read)),
+    )
+
+
+def parameters_of(task: Task, symbol: Symbol) -> tuple[str, ...]:
+    """The parameter names of a leaf: those that the domain declares, or else ``arg``, ``arg1``, …."""
+    for signature in task.signatures:
+        if (signature.kind, signature.symbol, len(signature.parameters)) == (
+            symbol.kind,
+            symbol.name,
+            symbol.arity,
+        ):
+            return parameter_names(signature.parameters)
+    numbered = tuple(f"arg{i}" for i in range(1, symbol.arity + 1))
+    return parameter_names(("arg",) if symbol.arity == 1 else numbered)

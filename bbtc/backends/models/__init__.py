@@ -1,0 +1,1 @@
+"""Trees as models for probabilistic model checkers: PRISM and JANI."""

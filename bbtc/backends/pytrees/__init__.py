@@ -1,0 +1,1 @@
+"""py_trees: a tree as a Python module."""

@@ -1,0 +1,246 @@
+"""Exporter ``py_trees``: a Python module for py_trees 2.2 and later.
+
+It holds the interface that a robot implements, the behaviours that py_trees lacks (copied or imported
+from :mod:`bbtc.runtime`), the tree, and a simulated world to run it in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from typing_extensions import assert_never
+
+from bbtc.backends.exporter import Figures, Option, OptionValue
+from bbtc.backends.interface import Interface, action_symbol, guard_of, interface_of, variable_symbol
+from bbtc.backends.names import PYTHON_RESERVED, Symbol, identifiers
+from bbtc.backends.pytrees.parts import (
+    CONDITION_TYPE,
+    ConditionCode,
+    action_summary,
+    condition_summary,
+    fact_tuple,
+    harmless,
+    method,
+)
+from bbtc.backends.pytrees.pycode import Code, Group, Prefixed, call, layout, literal, mapping
+from bbtc.backends.pytrees.runtime import RUNTIME, copied, defined, imports, needed, used_in
+from bbtc.backends.pytrees.world import WorldWriter
+from bbtc.backends.shape import fit, normal, words_of
+from bbtc.ground.condition import Condition
+from bbtc.ground.task import Task
+from bbtc.printable import printable
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlNode,
+    Node,
+    Tree,
+    actions_of,
+    retries_of,
+    tries_without_end,
+)
+
+_DEEPEST_EXPRESSION = 10  # levels of nodes in one function; a deeper subtree gets a function
+
+
+@dataclass(frozen=True, slots=True)
+class PyTreesNames:
+    """Which method of the generated interface stands for what."""
+
+    interface: Interface
+    methods: Mapping[Symbol, str]
+
+
+def py_trees_names(tree: Tree) -> PyTreesNames:
+    """The names used in the export of a tree."""
+    interface = interface_of(tree.task, tree.root)
+    return PyTreesNames(interface, identifiers(interface.leaves, "snake", PYTHON_RESERVED))
+
+
+@dataclass(frozen=True, slots=True)
+class PyTreesExporter:
+    """Writes a tree as a Python module."""
+
+    name: str = "py_trees"
+    description: str = "Python module for py_trees 2.2 or later, with a simulated world to run it in"
+    suffix: str = ".py"
+    options: tuple[Option, ...] = (RUNTIME,)
+
+    def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
+        """The source text. Raises :class:`BbtcError` (BBT0705) for a tree that is too deep."""
+        del figures  # a file that runs has no place for them
+        return _Writer(tree, embedded=options[RUNTIME.name] == "embedded").module()
+
+
+py_trees = PyTreesExporter()
+
+
+class _Writer:
+    """Writes one module. The tree comes first: it tells which helpers and imports are needed."""
+
+    def __init__(self, tree: Tree, *, embedded: bool) -> None:
+        self.embedded = embedded
+        self.task: Task = tree.task
+        self.claim = tree.success_probability
+        self.root = fit(tree.root, "py_trees")
+        self.names = py_trees_names(tree)
+        self.conditions = ConditionCode()
+        self.world = WorldWriter(tree, self.names.interface, self.names.methods, self.conditions)
+        self.branches: list[list[str]] = []
+        retries = [node for node, _ in retries_of(self.root)]
+        self.tried = {action.id for node in retries for action in actions_of(node)}
+
+    def module(self) -> str:
+        """The source text."""
+        body = layout(call("StopWhenBlocked", "robot", self._code(self.root, 1), "READS"), "return ", level=1)
+        root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *body]
+        trees, main = [*self.branches, root], _MAIN.splitlines()
+        tables = [self._reads(), *self.world.tables()]
+        # Without the methods of the robots, whose parameters may be named like anything.
+        used = {"Fact", "Protocol", "Status", "World", "run"}
+        used |= used_in(line for block in [*trees, *tables, main] for line in block)
+        if self.embedded:
+            used = needed(used)
+            nodes, world, head = copied("nodes", used), copied("world", used), imports(used)
+        else:
+            nodes, world, head = [], [], imports(used, ("bbtc.runtime", defined(used)))
+            head += ["", _PUBLIC]
+        lines = [*self._docstring(), "", *head]
+        for block in [self._protocol(), *nodes, *trees, *world, *tables, self.world.world(), main]:
+            lines += ["", "", *block]
+        return "\n".join(lines) + "\n"
+
+    def _docstring(self) -> list[str]:
+        problem, domain = harmless(self.task.problem), harmless(self.task.domain)
+        return [
+            f'"""Behavior tree for the problem {problem} of the domain {domain}. Made by bbtc.',
+            "",
+            f"In the model of that domain it succeeds with probability {self.claim}.",
+            *([_UNBOUNDED] if tries_without_end(self.root) else []),
+            *_USAGE.splitlines(),
+            _REQUIRED[self.embedded],
+            '"""',
+        ]
+
+    # --- interface ---------------------------------------------------------------------------
+
+    def _protocol(self) -> list[str]:
+        lines, methods = _PROTOCOL.splitlines(), self.names.methods
+        for leaf in self.names.interface.conditions:
+            lines += method(methods[leaf.symbol], leaf, CONDITION_TYPE, condition_summary(leaf))
+        for leaf in self.names.interface.actions:
+            lines += method(methods[leaf.symbol], leaf, "Status", action_summary(leaf))
+        return lines
+
+    def _reads(self) -> list[str]:
+        interface = self.names.interface
+        table = mapping(
+            (fact_tuple(variable), str(interface.leaves[variable_symbol(variable)].three_valued))
+            for variable in map(self.task.variables.__getitem__, interface.reads)
+        )
+        return [
+            *layout(table, "READS: dict[Fact, bool] = "),
+            '"""The facts that the tree reads, and whether they can be unknown."""',
+        ]
+
+    # --- tree --------------------------------------------------------------------------------
+
+    def _code(self, node: Node, level: int) -> Code:
+        match node:
+            case ControlNode():
+                if level > _DEEPEST_EXPRESSION:
+                    return self._branch(node)
+                children = [self._code(child, level + 1) for child in node.children]
+                bound = [] if node.attempts is None else [str(node.attempts)]
+                return call(node.kind, literal(_label(node)), *bound, *children)
+            case ConditionNode():
+                condition = normal(self.task, node.condition)
+                label = node.name or words_of(self.task, condition).short
+                return call("Condition", literal(printable(label)), self._test(condition))
+            case ActionNode():
+                return self._action(node)
+            case _:
+                assert_never(node)
+
+    def _branch(self, node: ControlNode) -> Code:
+        body = layout(self._code(node, 1), "return ", level=1)
+        name = f"branch_{len(self.branches) + 1}"
+        title = [f'    """For {harmless(node.reason)}."""'] if node.reason else []
+        self.branches.append([f"def {name}(robot: Robot) -> Behaviour:", *title, *body])
+        return call(name, "robot")
+
+    def _action(self, node: ActionNode) -> Code:
+        action = self.task.action_by_name[node.action]
+        method = f"robot.{self.names.methods[action_symbol(action)]}"
+        name = literal(printable(node.name or node.action))
+        items: list[Code] = [name, _thunk(call(method, *map(literal, action.args))), "robot.cancel"]
+        guard = guard_of(self.task, node)
+        if guard is not None:
+            items.append(Prefixed("guard=", self._test(guard)))
+        if not node.latched:
+            items.append("keep=False")
+        return call("Try" if node.id in self.tried else "Latch", *items)
+
+    def _test(self, condition: Condition) -> Code:
+        return _thunk(self.conditions.write(condition, self._read))
+
+    def _read(self, variable: int) -> Code:
+        read = self.task.variables[variable]
+        return call(f"robot.{self.names.methods[variable_symbol(read)]}", *map(literal, read.args))
+
+
+def _thunk(code: Code) -> Code:
+    """A function without arguments that returns the value of the code."""
+    if isinstance(code, Group) and not code.items:
+        return code.head.removesuffix("(")
+    return Prefixed("lambda: ", code)
+
+
+def _label(node: ControlNode) -> str:
+    reason = f"{node.kind} for {node.reason}" if node.reason else node.kind
+    return printable(node.name or node.template or reason)
+
+
+_CREATE_ROOT = '''\
+    """The tree. Latches stay latched, so it runs once: make a new one for another run."""'''
+
+_USAGE = """\
+Implement the class Robot, and run
+
+    run(create_root(MyRobot()), period=0.1)
+
+As a program, this module runs the tree in a simulated world (--help tells how).
+"""
+
+_UNBOUNDED = "Nothing bounds how often it tries: with a robot that always fails, it never ends."
+
+_REQUIRED = {
+    True: "It needs py_trees 2.2 or later.",
+    False: "It needs py_trees 2.2 or later, and bbtc.",
+}
+
+_PUBLIC = '__all__ = ["Robot", "SimulatedWorld", "create_root", "run"]'
+
+_PROTOCOL = '''\
+class Robot(Protocol):
+    """What the tree needs of a robot.
+
+    A condition answers at once: True, False, or None where it is unknown. An action is called in
+    every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
+    conditions show what it did.
+    """
+
+    def cancel(self, action: str) -> None:
+        """The running action, named as in the tree, is no longer wanted."""
+'''
+
+_MAIN = '''\
+def main() -> None:
+    """Run the tree in the simulated world."""
+    simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+
+if __name__ == "__main__":
+    main()
+'''

@@ -1,0 +1,98 @@
+"""The simulated world of a generated py_trees module: the exact outcome distribution of the task,
+as far as the tree can tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fractions import Fraction
+
+from bbtc.backends.interface import Interface
+from bbtc.backends.names import Symbol
+from bbtc.backends.pytrees.parts import (
+    CONDITION_TYPE,
+    ConditionCode,
+    fact_of,
+    fact_tuple,
+    method,
+    words_tuple,
+)
+from bbtc.backends.pytrees.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
+from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
+from bbtc.ground.task import Factor, Outcome, Task
+from bbtc.kleene import Truth
+from bbtc.tree.nodes import Tree
+
+_VALUES = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
+
+
+class WorldWriter:
+    """Writes the tables of facts and actions, and the class that plays the robot."""
+
+    def __init__(
+        self, tree: Tree, interface: Interface, methods: Mapping[Symbol, str], conditions: ConditionCode
+    ) -> None:
+        self._task: Task = tree.task
+        self._interface = interface
+        self._methods = methods
+        self._conditions = conditions
+        self._actions = actions_used(tree)
+        self._relevant = relevant_variables(tree)
+
+    def tables(self) -> list[list[str]]:
+        """``INITIAL`` and ``ACTIONS``."""
+        initial = layout(self._initial(), "INITIAL: list[tuple[str, State]] = ")
+        actions = mapping(
+            (words_tuple((action.schema, *action.args)), self._factors(action.factors))
+            for action in self._actions
+        )
+        return [
+            [*initial, '"""The states a run may start in, with their probabilities."""'],
+            [
+                *layout(actions, "ACTIONS: dict[Fact, list[Factor]] = "),
+                '"""What each action does: independent choices between outcomes."""',
+            ],
+        ]
+
+    def world(self) -> list[str]:
+        """The class ``SimulatedWorld``."""
+        lines = ["class SimulatedWorld(World):", '    """Plays the robot."""']
+        for leaf in self._interface.conditions:
+            answer = flat(call("self._value", *fact_of(leaf)))
+            lines += method(self._methods[leaf.symbol], leaf, CONDITION_TYPE, f"return {answer}")
+        for leaf in self._interface.actions:
+            answer = flat(call("self._act", *fact_of(leaf)))
+            lines += method(self._methods[leaf.symbol], leaf, "Status", f"return {answer}")
+        return lines
+
+    def _initial(self) -> Code:
+        merged = initial_values(self._task, self._relevant)
+        return sequence(
+            call("", _probability(p), self._state(zip(self._relevant, values, strict=True)))
+            for values, p in merged.items()
+        )
+
+    def _state(self, assignment: Iterable[tuple[int, Truth]]) -> Code:
+        return mapping((self._fact(index), _VALUES[value]) for index, value in assignment)
+
+    def _fact(self, index: int) -> str:
+        return fact_tuple(self._task.variables[index])
+
+    def _factors(self, factors: tuple[Factor, ...]) -> Code:
+        return sequence(sequence(map(self._outcome, factor.outcomes)) for factor in factors)
+
+    def _outcome(self, outcome: Outcome) -> Code:
+        always, *conditional = changes_of(self._task, outcome)
+        items: list[Code] = [_probability(outcome.probability), self._state(always.sets.items())]
+        for changes in conditional:
+            condition = Prefixed("lambda s: ", self._conditions.write(changes.when, self._read))
+            items.append(call("When", condition, self._state(changes.sets.items())))
+        if outcome.factors:
+            items.append(Prefixed("then=", self._factors(outcome.factors)))
+        return call("Outcome", *items)
+
+    def _read(self, index: int) -> Code:
+        return f"s[{self._fact(index)}]"
+
+
+def _probability(value: Fraction) -> str:
+    return literal(str(value))

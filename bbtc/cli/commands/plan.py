@@ -1,0 +1,272 @@
+"""``bbtc plan``: from a domain and a problem, or a compiled task, to a tree."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from types import FrameType
+from typing import TYPE_CHECKING
+
+import click
+
+from bbtc.cli.commands.verify import require_verified
+from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERRUPTED, EXIT_LIMIT
+from bbtc.cli.session import (
+    Count,
+    Probability,
+    Session,
+    output_options,
+    planning_limits,
+    problem_options,
+)
+from bbtc.cli.session import (
+    command as session_command,
+)
+from bbtc.diagnostics import LimitReached
+from bbtc.planner.strategies import DEFAULT
+from bbtc.watch import importing
+
+if TYPE_CHECKING:
+    from bbtc.ground.task import Task
+    from bbtc.limits import Limits
+    from bbtc.planner.options import Options, Retries
+    from bbtc.planner.result import Plan, Refinement
+    from bbtc.planner.why_not import DeadEnd
+    from bbtc.tree.nodes import Status
+
+_TELLING = 1.0
+"""Seconds for finding out why a target is out of reach, which is told besides."""
+
+STATUS_EXIT: dict[Status, int] = {
+    "target-reached": 0,
+    "out-of-reach": EXIT_ERRORS,
+    "stuck": EXIT_LIMIT,
+    "limit-reached": EXIT_LIMIT,
+    "interrupted": EXIT_INTERRUPTED,
+}
+
+
+@click.command("plan")
+@click.argument("files", nargs=-1, required=True, metavar="DOMAIN [PROBLEM]")
+@click.option(
+    "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
+)
+@click.option("--strategy", default=DEFAULT, show_default=True, help="Or auto, search, policy, refine.")
+@click.option("--max-actions", type=Count(0), metavar="K", help="Let no run take more actions.")
+@click.option(
+    "--retries",
+    type=click.Choice(["least", "unbounded"]),
+    default="least",
+    show_default=True,
+    help="Try again as often as the target takes, or without end (search, policy, auto).",
+)
+@click.option(
+    "--guarded",
+    is_flag=True,
+    help="Keep the checks that matter only where others change the world, too.",
+)
+@click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
+@click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
+@click.option("--verify", "verified", is_flag=True, help="Write the tree only if `bbtc verify` takes it.")
+@click.option("-q", "--quiet", is_flag=True, help="Do not print the refinements.")
+@problem_options
+@planning_limits
+@output_options
+@session_command
+def command(
+    session: Session,
+    files: tuple[str, ...],
+    target: Fraction | None,
+    strategy: str,
+    max_actions: int | None,
+    retries: Retries,
+    guarded: bool,
+    bounds: bool,
+    as_json: bool,
+    verified: bool,
+    quiet: bool,
+    output: str,
+    check: bool,
+    depfile: str | None,
+) -> int:
+    """Plan a tree that reaches the goal with the target probability, and write it as JSON.
+
+    Each refinement is printed: the condition that stopped the runs, what was inserted for it, and
+    the success probability after it. Exit status 0: target reached; 1: out of reach of any policy;
+    3: a limit was reached, or nothing was left to insert (the best tree is written all the same).
+
+    With --bounds, the best success probability of any policy is printed in place of a plan; 0: the
+    target can be reached; 1: it cannot; 3: a limit leaves that open.
+    """
+    from bbtc import artefacts
+    from bbtc.cli.inputs import load_task
+    from bbtc.planner.options import DEFAULTS, Options
+    from bbtc.planner.strategies import require_strategy
+
+    if as_json and not bounds:
+        raise click.UsageError("--json goes with --bounds: a tree is always written as JSON.")
+    limits = session.limits
+    options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
+    require_strategy(strategy, options if not bounds else DEFAULTS)
+    session.expect_output(output, files, check=check and not bounds, depfile=None if bounds else depfile)
+    task = load_task(session, files, limits)
+    if bounds:
+        wanted = task.goal_probability if target is None else target
+        return _print_bounds(session, task, wanted, options, output, as_json=as_json)
+    with best_tree_on_signals() as signals:
+        plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet, signals=signals)
+        if verified:
+            signals.end_at_once()
+            require_verified(session, plan.tree)
+        text = artefacts.dumps(artefacts.tree_to_json(plan.tree))
+        session.write(output, text, check=check, depfile=depfile)
+    return STATUS_EXIT[plan.tree.status]
+
+
+def _print_bounds(
+    session: Session, task: Task, target: Fraction, options: Options, output: str, *, as_json: bool
+) -> int:
+    from bbtc.cli.bounds_report import bounds_json, bounds_report
+    from bbtc.planner.bounds import task_value
+
+    with best_tree_on_signals() as signals:
+        signals.listen()
+        value = task_value(task, session.limits, options, costs=True)
+    session.clear()
+    text = bounds_json(value, target) if as_json else bounds_report(task, value, target)
+    session.write(output, text)
+    if value.lower >= target:
+        return 0
+    if value.interrupted:
+        return EXIT_INTERRUPTED
+    return EXIT_ERRORS if value.upper < target else EXIT_LIMIT
+
+
+def run_planner(
+    session: Session,
+    task: Task,
+    target: Fraction | None,
+    strategy: str,
+    limits: Limits,
+    options: Options | None = None,
+    *,
+    quiet: bool,
+    signals: Signals,
+) -> Plan:
+    """Plan, telling the session each refinement as it is made and how planning ended. Afterwards neither a
+    limit nor a signal keeps the tree from being written."""
+    from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
+    from bbtc.cli.wording import exact, plan_summary, refinement_line, simplified_line
+    from bbtc.ground.describe import describe
+    from bbtc.pipeline import plan_task
+    from bbtc.planner.options import DEFAULTS
+    from bbtc.planner.why_not import dead_ends
+
+    options = options or DEFAULTS
+    told: list[Refinement] = []
+
+    def tell(step: Refinement) -> None:
+        told.append(step)
+        if not quiet:
+            for line in refinement_line(len(told), step):
+                session.say(line)
+
+    if not quiet:
+        wanted = task.goal_probability if target is None else target
+        session.say(f"{task.domain}/{task.problem}: goal {describe(task, task.goal)}, target {exact(wanted)}")
+
+    def search_ends() -> None:
+        signals.hold()
+        session.watch.off()
+
+    limits.tell("planning")
+    plan = plan_task(
+        task,
+        target,
+        strategy,
+        limits,
+        tell,
+        options=options,
+        search_begins=signals.listen,
+        search_ends=search_ends,
+    )
+    if plan.tree.status == "stuck":
+        session.report.warning(
+            "BBT0502",
+            f"the strategy '{strategy}' has nothing left to insert before the target",
+            task.goal_span,
+            hint="another strategy may reach it",
+        )
+    most = options.max_actions
+    ends: tuple[DeadEnd, ...] = ()
+    with suppress(LimitReached):
+        ends = dead_ends(plan.tree, limits.overtime(_TELLING))
+    made = simplified_line(told[-1], plan.tree) if told and not quiet else []
+    lines = [
+        *made,
+        *plan_summary(plan, most),
+        *bounds_lines(plan.tree, most),
+        *dead_end_lines(plan.tree, ends, most),
+    ]
+    for line in lines:
+        session.say(line)
+    return plan
+
+
+@dataclass(slots=True)
+class Signals:
+    """What SIGINT (Ctrl-C) and SIGTERM do to planning: the first one ends the search with the best tree so
+    far; the third one, for people without patience, ends the program without it."""
+
+    came: int = 0
+    listening: bool = False
+    held: bool = False
+
+    def listen(self) -> None:
+        """From now on there is a search that can be ended."""
+        self.listening = True
+
+    def hold(self) -> None:
+        """The search is over, and what is left is to write the tree: do not disturb."""
+        self.held = True
+
+    def end_at_once(self) -> None:
+        """From now on a signal ends the program."""
+        self.listening, self.held, self.came = True, False, 0
+
+    def stop(self, number: int, frame: FrameType | None) -> None:
+        """The handler."""
+        if not self.held and (not self.listening or importing(frame)):
+            # Too early, in a moment it will do.
+            threading.Timer(_MOMENT, os.kill, (os.getpid(), number)).start()
+            return
+        self.came += 1
+        if self.came >= _IMPATIENT or (self.came == 1 and not self.held):
+            raise KeyboardInterrupt
+
+
+_MOMENT = 0.05  # seconds
+_IMPATIENT = 3
+
+
+@contextmanager
+def best_tree_on_signals() -> Iterator[Signals]:
+    """Handle signals as :class:`Signals` says."""
+    signals = Signals()
+    if threading.current_thread() is not threading.main_thread():
+        yield signals
+        return
+    kinds = [signal.SIGTERM]
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # by whoever started us
+        kinds.append(signal.SIGINT)
+    before = {kind: signal.signal(kind, signals.stop) for kind in kinds}
+    try:
+        yield signals
+    finally:
+        for kind, handler in before.items():
+            signal.signal(kind, handler)

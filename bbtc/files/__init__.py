@@ -1,0 +1,1 @@
+"""Reading regular files, and writing whole files or nothing."""

@@ -1,0 +1,1 @@
+"""What a task can reach, ignoring deletes, as a Datalog program."""

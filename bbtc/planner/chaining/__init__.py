@@ -1,0 +1,1 @@
+"""Backward chaining: trees refined by what achieves a condition that fails."""

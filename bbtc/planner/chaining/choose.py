@@ -1,0 +1,260 @@
+"""What to insert for a failed condition (paper, section "Iterative Behavior Tree Expansion").
+
+Candidates are scored by the paper's three factors: the probability of a successful postcondition,
+whether the preconditions hold in the current belief, and what was tried before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TypeAlias
+
+from bbtc.belief.state import State, Transition, Values, compile_action
+from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
+from bbtc.ground.task import GroundAction, Task, effects_of
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.planner.chaining.draft import Doing, Subgoal, changed_by
+from bbtc.planner.chaining.relaxed import RelaxedReachability, helpful, possible
+
+OPEN_SHARE = Fraction(1, 2)
+"""An outcome that leaves a false condition unknown counts this much: it may still be observed true."""
+
+UNMET_DISCOUNT = Fraction(4, 5)
+"""A candidate's score is multiplied by this for every precondition that does not hold yet."""
+
+
+_Tried: TypeAlias = tuple[frozenset[Condition], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A failed condition: the subgoal, what it was (false or unknown), and the final states it
+    fails in, with their probabilities."""
+
+    subgoal: Subgoal
+    value: Truth
+    states: tuple[tuple[State, Fraction], ...]
+    excluded: frozenset[str] = frozenset()
+    """Names not to insert: what was inserted already and never started in these states (once
+    more, it would not start either), and what was taken back before."""
+
+    @property
+    def probability(self) -> Fraction:
+        """Probability that a run ends because of this condition."""
+        return sum((p for _, p in self.states), Fraction(0))
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Something that may resolve a target. ``success`` is the probability that the condition
+    holds (is known, where it was unknown) after it, over the target's states, ``open`` that it
+    becomes unknown where it was false; ``conditions`` are what must hold first; ``unmet`` counts
+    those that do not hold in some of the states."""
+
+    doing: Doing | None
+    conditions: tuple[Condition, ...]
+    success: Fraction
+    open: Fraction
+    unmet: int
+    tried: int
+
+    @property
+    def name(self) -> str:
+        """The ground name of what is inserted."""
+        return self.doing.name if self.doing is not None else "(a part of the disjunction)"
+
+    @property
+    def score(self) -> Fraction:
+        """Probability of success, discounted for every unmet precondition."""
+        return (self.success + self.open * OPEN_SHARE) * UNMET_DISCOUNT**self.unmet
+
+    def rank(self) -> tuple[Fraction, int, Fraction, str]:
+        """Sort key, best first: score, fewest tries, cost, name."""
+        cost = self.doing.cost if isinstance(self.doing, GroundAction) else Fraction(0)
+        return (-self.score, self.tried, cost, self.name)
+
+
+class Chooser:
+    """Finds the candidates for a target; everything that depends on the task only is indexed once."""
+
+    def __init__(self, task: Task, transitions: dict[str, Transition], limits: Limits) -> None:
+        self.task = task
+        self.transitions = transitions
+        self.limits = limits
+        self.reachability = RelaxedReachability(task, limits)
+        self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
+        self._guides: dict[str, Transition] = {}
+        self._helps: dict[tuple[Subgoal, _Tried, Truth, Values, frozenset[str]], bool] = {}
+        doings: list[Doing] = [*task.actions, *task.templates]
+        for doing in doings:
+            for fact in sorted({fact for effect in effects_of(doing.factors) for fact in effect.sets}):
+                self._by_fact.setdefault(fact, []).append(doing)
+
+    def helps(self, target: Target) -> bool:
+        """Is there any candidate for a target of one state?"""
+        ((state, _),) = target.states
+        key = (target.subgoal, tried_parts(target.subgoal), target.value, state.values, target.excluded)
+        if key not in self._helps:
+            self._helps[key] = bool(self.candidates(target))
+        return self._helps[key]
+
+    def candidates(self, target: Target) -> list[Candidate]:
+        """Everything worth inserting for a target, best first; empty if nothing helps."""
+        goal = target.subgoal.condition
+        ongoing = {
+            attempt.doing.name
+            for attempt in (target.subgoal.parent.ancestors() if target.subgoal.parent else ())
+            if attempt.doing is not None
+        }
+        doings: dict[str, Doing] = {}
+        for fact in helpful(goal, target.value):
+            for doing in self._by_fact.get(fact, ()):
+                if doing.name not in ongoing and doing.name not in target.excluded:
+                    doings[doing.name] = doing
+        found: list[Candidate] = []
+        for doing in doings.values():
+            found.extend(self._variants(target, doing))
+        if not found:
+            found = list(self._parts(target))
+        return sorted(found, key=Candidate.rank)
+
+    def _variants(self, target: Target, doing: Doing) -> Iterator[Candidate]:
+        """The doing as it is, or, where its effect on the condition is guarded and the guard does
+        not hold in the target's states, with the guard as a further precondition."""
+        goal = target.subgoal.condition
+        conditions = conjuncts(doing.precondition)
+        if any(circular(condition, goal, target.value) for condition in conditions):
+            return
+        states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
+        if not states:
+            return
+        tried = sum(a.doing is doing for a in target.subgoal.attempts())
+        chances = self._chances(doing, target, {}, states)
+        if any(chances):
+            inserted = self._inserted(doing, conditions)
+            yield Candidate(doing, inserted, *chances, _unmet(conditions, states), tried)
+            return
+        for guard in _guards(doing, frozenset(variables(goal))):
+            more = (*conditions, *(c for c in conjuncts(guard) if c not in conditions))
+            if any(circular(c, goal, target.value) for c in more):
+                continue
+            reachable = [(s, p) for s, p in states if self._applicable(more, s)]
+            forced = _forced(guard)
+            if reachable and forced is not None:
+                chances = self._chances(doing, target, forced, reachable)
+                if any(chances):
+                    inserted = self._inserted(doing, more)
+                    yield Candidate(doing, inserted, *chances, _unmet(more, reachable), tried)
+
+    def _inserted(self, doing: Doing, conditions: tuple[Condition, ...]) -> tuple[Condition, ...]:
+        """The preconditions that stand before the doing in the tree. Those a template's body can
+        change itself are only a guide: read on every tick, they would stop it half way."""
+        if isinstance(doing, GroundAction):
+            return conditions
+        changed = changed_by(self.task, doing.body)
+        return tuple(c for c in conditions if changed.isdisjoint(variables(c)))
+
+    def _applicable(self, conditions: tuple[Condition, ...], state: State) -> bool:
+        facts = self.reachability.facts(state.values)
+        return all(possible(condition, facts) for condition in conditions)
+
+    def _chances(
+        self,
+        doing: Doing,
+        target: Target,
+        forced: Mapping[int, Truth],
+        states: list[tuple[State, Fraction]],
+    ) -> tuple[Fraction, Fraction]:
+        """Probabilities, given the states, that the doing makes the goal true (known, if it was
+        unknown), and that it leaves it to be observed, with some variables forced to the values
+        that its guard asks for."""
+        transition = self._transition(doing)
+        success = observable = Fraction(0)
+        goal = target.subgoal.condition
+        for state, probability in states:
+            values = bytearray(state.values)
+            for variable, value in forced.items():
+                values[variable] = value
+            may_hold = possible(goal, self.reachability.facts(state.values))
+            for result in transition(bytes(values)):
+                after = evaluate(goal, result.values)
+                if after is Truth.TRUE or (target.value is Truth.UNKNOWN and after is Truth.FALSE):
+                    success += probability * result.probability
+                elif after is Truth.UNKNOWN and target.value is Truth.FALSE and may_hold:
+                    observable += probability * result.probability
+        return success / target.probability, observable / target.probability
+
+    def _transition(self, doing: Doing) -> Transition:
+        store = self.transitions if isinstance(doing, GroundAction) else self._guides
+        if doing.name not in store:
+            if isinstance(doing, GroundAction):
+                action = doing
+            else:
+                action = GroundAction(doing.template, doing.args, doing.precondition, doing.factors)
+            store[doing.name] = compile_action(action, self.limits)
+        return store[doing.name]
+
+    def _parts(self, target: Target) -> Iterator[Candidate]:
+        """For a disjunction or a conjunction that no single action achieves: its parts as
+        conditions to achieve one after the other."""
+        goal = target.subgoal.condition
+        if isinstance(goal, Or):
+            parts = goal.parts
+        elif isinstance(goal, And):
+            parts = (goal,)
+        else:
+            return
+        tried = tried_parts(target.subgoal)
+        for part in parts:
+            conditions = conjuncts(part)
+            states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
+            if states and frozenset(conditions) not in tried:
+                share = sum((p for _, p in states), Fraction(0)) / target.probability
+                yield Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
+
+
+def tried_parts(subgoal: Subgoal) -> _Tried:
+    """What each attempt at a subgoal asks for first: what was tried is not tried again."""
+    return tuple(frozenset(p.condition for p in attempt.preconditions) for attempt in subgoal.attempts())
+
+
+def circular(condition: Condition, goal: Condition, value: Truth) -> bool:
+    """Does a precondition ask for the goal itself, or for the value of what is unknown?"""
+    if condition == goal:
+        return True
+    return (
+        value is Truth.UNKNOWN
+        and isinstance(condition, Is)
+        and condition.value is not Truth.UNKNOWN
+        and condition.variable in variables(goal)
+    )
+
+
+def _guards(doing: Doing, wanted: frozenset[int]) -> list[Condition]:
+    """The guards of the effects on some variables, each once."""
+    guards = (
+        effect.when
+        for effect in effects_of(doing.factors)
+        if any(variable in wanted for variable, _ in effect.sets)
+    )
+    return list(dict.fromkeys(guard for guard in guards if guard is not None))
+
+
+def _unmet(conditions: tuple[Condition, ...], states: list[tuple[State, Fraction]]) -> int:
+    return sum(
+        any(evaluate(condition, state.values) is not Truth.TRUE for state, _ in states)
+        for condition in conditions
+    )
+
+
+def _forced(guard: Condition) -> dict[int, Truth] | None:
+    """The assignment a conjunction of literals asks for; None for other guards."""
+    forced = {}
+    for part in conjuncts(guard):
+        if not isinstance(part, Is):
+            return None
+        forced[part.variable] = part.value
+    return forced

@@ -1,0 +1,265 @@
+"""Bounds on P* that close by expanding only the states that matter.
+
+Bounded search with a whole batch of states at a time, in the spirit of LAO* (Hansen and Zilberstein
+2001) and bounded real-time dynamic programming (Brázdil et al. 2014). The part of the space that was
+expanded is solved twice: with the open states lost, which gives a lower bound and a policy that
+attains it, and with those won that are not dead ends for sure, which gives an upper bound. End
+components are merged by the solver, so both are sound and close whatever loops there are.
+
+1. Solve. 2. Stop when the bounds have met. 3. Find the open states that runs of the optimistic policy
+end in; among the choices that are equally good by the bounds it prefers what is solved, then the way
+to the goal that the heuristic thinks short. 4. Expand them, the most probable first, and from there
+greedily after the heuristic, a share of what was expanded before; repeat.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from bbtc.diagnostics import Diagnostic, LimitReached
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.planner.mdp.explore import Choices, Explorer, StateSpace, ranges
+from bbtc.planner.mdp.graph import Floats, Graph, Number, sums
+from bbtc.planner.mdp.h_add import Costs, Heuristic
+from bbtc.planner.mdp.maxprob import Bounds, Reachability, draw_probabilities, reachability
+from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.transitions import Index
+
+_CLOSED = 1e-9  # bounds this close have met
+_SMALLEST = 256  # states expanded at a time, at least
+_SHARE = 4  # else this part of those expanded before
+_OFTEN = 100  # solutions in which the expanded states did not become twice as many; from then on
+_LEAST_SHARE = 16  # at least this part of them is expanded
+_FAR = 1e4  # what a dead end counts as, in actions
+_SWEEPS = 100  # steps for which runs of the optimistic policy are followed
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """What a search found: the part of the space it expanded, solved from below (``lower``; its
+    policy attains the lower bound), and the bounds on P*. ``stop`` says which limit ended it before
+    the bounds met, if one did; ``interrupted`` tells that the user did."""
+
+    lower: Reachability
+    bounds: Bounds
+    stop: Diagnostic | None
+    interrupted: bool = False
+
+    @property
+    def space(self) -> StateSpace:
+        """The part of the space."""
+        return self.lower.space
+
+
+@dataclass(frozen=True, slots=True)
+class _Solved:
+    space: StateSpace
+    graph: Graph
+    lower: Reachability
+    upper: Reachability
+
+    @property
+    def bounds(self) -> Bounds:
+        low = self.lower.initial.lower
+        return Bounds(low, max(low, self.upper.initial.upper))
+
+
+def search_bounds(task: Task, limits: Limits, target: Fraction | None = None) -> Searched:
+    """Search until the bounds on P* have met, or tell whether the target can be reached, or a limit
+    is met. Raises ``LimitReached`` only if the time is over before anything was found."""
+    return _Search(task, limits, target).run()
+
+
+class _Search:
+    def __init__(self, task: Task, limits: Limits, target: Fraction | None) -> None:
+        self.limits, self.target = limits, target
+        self.explorer = Explorer(task, limits)
+        self.heuristic = Heuristic(task, self.explorer.packing)
+        self.probability = np.empty(0)
+        self.guess: Costs = np.empty(0, dtype=np.float32)
+        self.closed: Flags = np.empty(0, dtype=np.bool_)
+        """States that need not be expanded: those that were, goals, dead ends."""
+        self.expanded = 0
+        self.doubled_at, self.since_doubled = 1, 0
+        self._note()
+
+    def run(self) -> Searched:
+        solved = self._solve()
+        stop: Diagnostic | None = None
+        try:
+            while not self._done(solved.bounds) and solved.space.open.any():
+                frontier, mass = self._frontier(solved)
+                if not len(frontier):
+                    break  # the optimistic policy is a policy, and the bounds met but for rounding
+                self._plunge(frontier, mass)
+                solved = self._solve()
+        except LimitReached as reached:
+            stop = reached.diagnostics[0]
+            if len(solved.space.states) < self.explorer.count:
+                solved = self._solve_late(solved)
+        except KeyboardInterrupt:
+            return Searched(solved.lower, solved.bounds, None, interrupted=True)
+        return self._finished(solved, stop)
+
+    def _done(self, bounds: Bounds) -> bool:
+        if self.target is not None and (bounds.lower >= self.target or bounds.upper < self.target):
+            return True
+        return bounds.upper - bounds.lower <= _CLOSED
+
+    def _solve(self) -> _Solved:
+        space = self.explorer.space(~self.closed, (), None)
+        graph = Graph(space)
+        lower = reachability(space, self.limits, graph=graph, rationals=False)
+        hope = space.goal | space.open
+        upper = reachability(space, self.limits, hope, graph=graph, rationals=False)
+        solved = _Solved(space, graph, lower, upper)
+        bounds = solved.bounds
+        self.limits.tell(
+            "search for the best probability", space.expanded, (float(bounds.lower), float(bounds.upper))
+        )
+        return solved
+
+    def _solve_late(self, before: _Solved) -> _Solved:
+        try:
+            return self._solve()
+        except LimitReached:
+            return before
+
+    def _finished(self, solved: _Solved, stop: Diagnostic | None) -> Searched:
+        """The last solution once more, in rationals where that is possible."""
+        lower, bounds = solved.lower, solved.bounds
+        try:
+            lower = reachability(solved.space, self.limits, graph=solved.graph)
+            low = max(bounds.lower, lower.initial.lower)
+            bounds = Bounds(low, max(low, bounds.upper))
+            if bounds.exact is None and bounds.upper - low <= _CLOSED:
+                hope = solved.space.goal | solved.space.open
+                upper = reachability(solved.space, self.limits, hope, graph=solved.graph).initial.upper
+                bounds = Bounds(low, max(low, min(bounds.upper, upper)))
+        except LimitReached:
+            pass
+        return Searched(lower, bounds, stop)
+
+    # --- what to expand --------------------------------------------------------------------------
+
+    def _frontier(self, solved: _Solved) -> tuple[Index, Floats]:
+        """The open states that runs of the optimistic policy end in, the most probable first, and
+        how probable they are."""
+        space, graph, lower, upper = solved.space, solved.graph, solved.lower, solved.upper
+        allowed = upper.best.copy()
+        met = (lower.lower >= upper.upper - _CLOSED) & ~upper.zero & ~space.goal
+        allowed[met[graph.choice_state]] = False
+        own = lower.policy[met]
+        allowed[own[own >= 0]] = True
+        ahead = np.where(space.open, np.minimum(self.guess, _FAR), 0).astype(np.int32)
+        via = graph.reach(space.goal | space.open, allowed, ahead).via
+        states, mass = _followed(space, via)
+        found = np.flatnonzero(space.open[states])
+        found = found[np.argsort(-mass[found], kind="stable")]
+        return states[found], mass[found]
+
+    def _plunge(self, frontier: Index, mass: Floats) -> None:
+        """Expand open states, and from each follow the choice that the heuristic prefers."""
+        budget = max(_SMALLEST, self.expanded // _SHARE)
+        least = self.expanded + (self.expanded // _LEAST_SHARE if self._solved_often() else 0)
+        share = max(1, _SMALLEST // 4, budget // 2)
+        while len(frontier) and budget > 0:
+            chosen = np.argsort(-mass, kind="stable")[: min(share, budget)]
+            chosen = chosen[np.argsort(frontier[chosen], kind="stable")]
+            states, weights = frontier[chosen], mass[chosen]
+            mark = self.explorer.mark()
+            budget -= self._expand(states)
+            frontier, mass = self._next(self.explorer.since(mark), states, weights)
+        if self.expanded < least:  # else the space would be solved too often
+            waiting = np.flatnonzero(~self.closed)
+            nearest = np.argsort(self.guess[waiting], kind="stable")[: least - self.expanded]
+            self._expand(np.sort(waiting[nearest]))
+
+    def _solved_often(self) -> bool:
+        """Was the space solved many times since it was half as large?"""
+        if self.expanded >= 2 * self.doubled_at:
+            self.doubled_at, self.since_doubled = self.expanded, 0
+        self.since_doubled += 1
+        return self.since_doubled > _OFTEN
+
+    def _expand(self, states: Index) -> int:
+        """Expand states, in order; how many were."""
+        done = self.explorer.expand(states, self.limits)
+        self.expanded += done
+        self.closed[states[:done]] = True
+        self._note()
+        return done
+
+    def _next(self, found: Choices, states: Index, weights: Floats) -> tuple[Index, Floats]:
+        """The open states that the preferred choices lead to, and how probable they are."""
+        if not len(found.owner):
+            return np.empty(0, dtype=np.int64), np.empty(0)
+        draws = self.explorer.tables.draws
+        if len(self.probability) < len(draws):
+            self.probability = np.array([float(draw.probability) for draw in draws])
+        count = len(found.owner)
+        choice = np.repeat(np.arange(count), found.edges)
+        weight = self.probability[found.draw]
+        loops = found.target == found.owner[choice]
+        onward = np.maximum(1e-12, sums(choice[~loops], weight[~loops], count))
+        ahead = np.minimum(self.guess[found.target], _FAR).astype(np.float64)
+        total = (1 + sums(choice[~loops], (weight * ahead)[~loops], count)) / onward
+        order = np.lexsort((np.arange(count), total, found.owner))
+        first = np.ones(count, dtype=np.bool_)
+        np.not_equal(found.owner[order][1:], found.owner[order][:-1], out=first[1:])
+        best = np.zeros(count, dtype=np.bool_)
+        best[order[first]] = True
+        edges = best[choice] & ~self.closed[found.target]
+        arrived = weights[np.searchsorted(states, found.owner)][choice] * (weight / onward[choice])
+        targets, place = np.unique(found.target[edges], return_inverse=True)
+        return targets, sums(place, arrived[edges], len(targets))
+
+    def _note(self) -> None:
+        """Take the states that were found since into account."""
+        known, count = len(self.guess), self.explorer.count
+        if known == count:
+            return
+        guess = self.heuristic.estimate(self.explorer.table.states[known:count])
+        self.guess = np.concatenate([self.guess, guess])
+        self.closed = np.concatenate([self.closed, np.isinf(guess)]) | self.explorer.goal()
+
+
+def _followed(space: StateSpace, via: Number) -> tuple[Index, Floats]:
+    """The states that runs visit which take the choices of ``via``, and the probability of being
+    there after some steps (of having ended there, where a state has no choice)."""
+    number = np.full(len(space.states), -1, dtype=np.int64)
+    found: list[Index] = []
+    frontier: Index = np.unique([state for _, state in space.initial]).astype(np.int64)
+    count = 0
+    while len(frontier):
+        number[frontier] = count + np.arange(len(frontier))
+        count += len(frontier)
+        found.append(frontier)
+        choices = via[frontier]
+        choices = choices[choices >= 0]
+        edges = ranges(space.edge_first[choices], space.edge_first[choices + 1] - space.edge_first[choices])
+        targets = np.unique(space.edge_target[edges]).astype(np.int64)
+        frontier = targets[number[targets] < 0]
+    states = np.concatenate(found)
+    moving = np.flatnonzero(via[states] >= 0)
+    choices = via[states[moving]]
+    counts = space.edge_first[choices + 1] - space.edge_first[choices]
+    edges = ranges(space.edge_first[choices], counts)
+    source = np.repeat(moving, counts)
+    target = number[space.edge_target[edges]]
+    weight = draw_probabilities(space)[edges]
+    mass = np.zeros(count)
+    for probability, state in space.initial:
+        mass[number[state]] += float(probability)
+    resting = np.ones(count, dtype=np.bool_)
+    resting[moving] = False
+    for _ in range(_SWEEPS):
+        after = np.where(resting, mass, 0.0) + sums(target, mass[source] * weight, count)
+        if np.abs(after - mass).max() < 1e-6:
+            break
+        mass = after
+    return states, mass

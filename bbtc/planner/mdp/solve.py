@@ -1,0 +1,77 @@
+"""P* of a task by whatever means get to it: the whole space where it is small enough, else a search
+that expands only what matters."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+from fractions import Fraction
+
+from bbtc.diagnostics import Diagnostic, LimitReached
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.planner.mdp.bounded_search import search_bounds
+from bbtc.planner.mdp.explore import StateSpace, explore_space
+from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
+from bbtc.planner.mdp.maxprob import Bounds, Reachability, reachability
+
+_SHARE = 1 / 3  # of the time, for the exploration of the whole space
+_BEFORE_VALUES = 1 / 2  # of the time, for exploration within a number of actions
+
+
+@dataclass(frozen=True, slots=True)
+class Best:
+    """``found`` holds the values of what was explored, and a policy that attains ``bounds.lower``.
+    ``stop`` is the limit that left the bounds apart, if one did; ``interrupted`` tells that the user
+    did."""
+
+    found: Reachability
+    bounds: Bounds
+    stop: Diagnostic | None = None
+    interrupted: bool = False
+
+    @property
+    def space(self) -> StateSpace:
+        """What was explored: everything, or what matters."""
+        return self.found.space
+
+
+def best_known(task: Task, limits: Limits, target: Fraction | None = None, *, whole: bool = False) -> Best:
+    """Bounds on P* that meet if the limits allow it. With a ``target``, where the whole space is too
+    large, they need only tell whether it can be reached.
+
+    Raises ``LimitReached`` only if the time is over before anything was found, or with ``whole`` if
+    the limits do not allow to explore the whole space.
+    """
+    space = explore_space(task, limits if whole else limits.part(_SHARE))
+    if space.complete:
+        found = reachability(space, limits)
+        return Best(found, found.initial)
+    if whole:
+        assert space.stop is not None
+        raise LimitReached([space.stop])
+    del space  # two of them may be too much
+    searched = search_bounds(task, limits, target)
+    return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+
+
+@dataclass(frozen=True, slots=True)
+class BestWithin:
+    """The values with a number of actions left, in what was explored, and bounds on the task's."""
+
+    horizon: Horizon
+    bounds: Bounds
+    stop: Diagnostic | None
+
+
+def best_within(task: Task, limits: Limits, max_actions: int) -> BestWithin:
+    """Bounds on the best probability with at most so many actions. Raises ``LimitReached`` if the
+    time is over before anything was found."""
+    space = explore_space(task, limits.part(_BEFORE_VALUES), max_actions)
+    horizon = horizon_values(space, max_actions, limits)
+    if space.stop is None:
+        return BestWithin(horizon, horizon.initial[-1], None)
+    upper = Fraction(1)
+    with contextlib.suppress(LimitReached):
+        upper = horizon_values(space, max_actions, limits, space.goal | space.open).initial[-1].upper
+    return BestWithin(horizon, Bounds(horizon.initial[-1].lower, upper), space.stop)

@@ -1,0 +1,1 @@
+"""From policies to trees: rules, and the tree that follows them."""

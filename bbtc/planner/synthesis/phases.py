@@ -1,0 +1,98 @@
+"""Policies within a number of actions, as phases: in each, a state has offers that are optimal
+whatever number of actions is left there.
+
+A tree does not count its steps, but a retry node bounds how many actions start below it. Where one
+assignment of choices to states is optimal all along, one retry node around the tree is enough;
+where the best choice changes as the budget runs out, phases follow one another, each with a retry
+node of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bbtc.limits import Limits
+from bbtc.planner.mdp.explore import ranges
+from bbtc.planner.mdp.finite_horizon import Horizon, best_choices, cheapest_choices
+from bbtc.planner.mdp.graph import Graph
+from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.transitions import Index
+from bbtc.planner.synthesis.permissive import Offers, offers_of
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """Up to ``steps`` actions by these offers."""
+
+    steps: int
+    offers: Offers
+
+
+def phases(horizon: Horizon, limits: Limits) -> list[Phase]:
+    """The phases of a policy that attains the horizon's value; of the cheapest such policies unless
+    others do with fewer phases. Raises ``LimitReached`` when the time is over."""
+    graph = Graph(horizon.space)
+    best = [best_choices(horizon, graph, step) for step in range(1, len(horizon.values))]
+    cheap = _phases(horizon, graph, cheapest_choices(horizon, graph, best), limits)
+    any_of_best = _phases(horizon, graph, best, limits) if len(cheap) > 1 else cheap
+    return any_of_best if len(any_of_best) < len(cheap) else cheap
+
+
+def _phases(horizon: Horizon, graph: Graph, best: list[Flags], limits: Limits) -> list[Phase]:
+    space = horizon.space
+    left = len(horizon.values) - 1
+    entry: Index = np.unique([state for _, state in space.initial]).astype(np.int64)
+    found: list[Phase] = []
+    while left and len(entry):
+        steps, offered, inside, leaving = _longest(horizon, graph, best[:left], entry, limits)
+        found.append(Phase(steps, offers_of(space, offered, entry, inside)))
+        left -= steps
+        entry = leaving
+    return found
+
+
+def _longest(
+    horizon: Horizon, graph: Graph, best_at: list[Flags], entry: Index, limits: Limits
+) -> tuple[int, Flags, Flags, Index]:
+    """The longest phase from a set of states, with as many actions left as there are best choices
+    given: its length, the choices offered, the states in which it may start an action, and those it
+    may end in."""
+    space = horizon.space
+    left = len(best_at)
+    offered = np.zeros(graph.choices, dtype=np.bool_)
+    inside = np.zeros(graph.states, dtype=np.bool_)
+    steps = 0
+    while steps < left and len(entry):
+        limits.check_time("the search for a policy")
+        best = best_at[left - steps - 1].copy()
+        best[np.asarray(horizon.values[left - steps])[graph.choice_state] == 0] = False
+        fresh = np.zeros(graph.states, dtype=np.bool_)
+        fresh[entry] = True
+        again = fresh & inside
+        chosen = offered.copy()
+        chosen[fresh[graph.choice_state] & ~inside[graph.choice_state]] = True
+        chosen &= best | ~fresh[graph.choice_state]
+        # A state seen before must keep some choice, unless it is given up now: going on is harmless.
+        had = _with_choice(graph, offered)
+        given_up = ~_with_choice(graph, best)
+        chosen |= offered & given_up[graph.choice_state]
+        if (again & had & ~_with_choice(graph, chosen)).any():
+            break
+        # A state given up before, but not now, cannot be told from the one that was.
+        offered, inside = chosen, inside | fresh
+        steps += 1
+        choices = ranges(space.choice_first[entry], space.choice_first[entry + 1] - space.choice_first[entry])
+        choices = choices[offered[choices]]
+        edges = ranges(space.edge_first[choices], space.edge_first[choices + 1] - space.edge_first[choices])
+        targets = np.unique(space.edge_target[edges]).astype(np.int64)
+        entry = targets[~space.goal[targets]]
+    return max(1, steps), offered, inside, entry
+
+
+def _with_choice(graph: Graph, choices: Flags) -> Flags:
+    """States that have one of the choices."""
+    found = np.zeros(graph.states, dtype=np.bool_)
+    found[graph.choice_state[choices]] = True
+    return found

@@ -1,0 +1,126 @@
+"""The strategy ``policy``: an optimal policy, written down as a small tree.
+
+1. Explore the states of the task. 2. Find P* and, among the policies that attain it, the cheapest.
+3. Write these as rules (:mod:`bbtc.planner.synthesis.rules`), and the rules as a tree. 4. Bound how
+often it tries again (:mod:`bbtc.rewrite.retry`). 5. Simulate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from bbtc.belief.chain import explore
+from bbtc.belief.simulate import success_of
+from bbtc.diagnostics import Diagnostic, LimitReached
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.planner.best_tree import BestTree
+from bbtc.planner.finish import GRACE, finish
+from bbtc.planner.mdp.maxprob import Bounds
+from bbtc.planner.mdp.solve import best_known, best_within
+from bbtc.planner.options import DEFAULTS, Options
+from bbtc.planner.result import Plan, Progress
+from bbtc.planner.synthesis.permissive import best_offers, likely_offers
+from bbtc.planner.synthesis.phases import phases
+from bbtc.planner.synthesis.tree import in_phases, synthesize
+from bbtc.rewrite.retry import longest_run
+from bbtc.rewrite.shrink import shrunk
+from bbtc.rewrite.simplify import numbered, simplified, size
+from bbtc.tree.nodes import ConditionNode, Node
+
+_BEFORE_TREE = 0.6  # of the time, for all that comes before a tree
+_DRAFTS = (50, 1000)  # states of a larger policy that a tree is made of first, to fall back on
+
+
+@dataclass(slots=True)
+class _Search:
+    """The best tree so far, what is known of the best possible, and what stopped the search."""
+
+    task: Task
+    target: Fraction
+    limits: Limits
+    options: Options
+    best: BestTree
+    whole: bool = False
+    bounds: Bounds = field(default_factory=lambda: Bounds(Fraction(0), Fraction(1)))
+    stop: Diagnostic | None = None
+    interrupted: bool = False
+
+    def run(self) -> None:
+        """Search until done, stopped by a limit, or interrupted."""
+        try:
+            if self.options.max_actions is None:
+                self._without_end()
+            else:
+                self._within(self.options.max_actions)
+        except LimitReached as reached:
+            self.stop = reached.diagnostics[0]
+        except KeyboardInterrupt:
+            self.interrupted = True
+
+    def _without_end(self) -> None:
+        best = best_known(self.task, self.limits.part(_BEFORE_TREE), self.target, whole=self.whole)
+        self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
+        limits = self.limits.within(GRACE) if best.interrupted else self.limits
+        for most in _DRAFTS:
+            draft = likely_offers(best.found, most)
+            if draft is None:
+                break
+            self._keep(synthesize(self.task, draft, limits), limits)
+        offers, _ = best_offers(best.found, limits)
+        self._keep(synthesize(self.task, offers, limits), limits)
+        finish(self.best, limits, self.options)
+
+    def _within(self, steps: int) -> None:
+        best = best_within(self.task, self.limits.part(_BEFORE_TREE), steps)
+        self.bounds, self.stop, horizon = best.bounds, best.stop, best.horizon
+        parts = phases(horizon, self.limits)
+        done = False
+        if len(parts) == 1:
+            root = synthesize(self.task, parts[0].offers, self.limits)
+            longest = longest_run(explore(self.task, root, self.limits))
+            if longest is not None and longest <= steps:
+                self._keep(root)
+                done = True
+        if not done:
+            self._keep(in_phases(self.task, [(part.steps, part.offers) for part in parts], self.limits))
+        simple = simplified(self.task, self.best.root, self.limits)
+        self._keep(numbered(shrunk(self.task, simple, self.target, self.limits)))
+
+    def _keep(self, root: Node, limits: Limits | None = None) -> None:
+        """Take a tree for the best so far, unless it does worse and does not reach the target."""
+        limits = limits or self.limits
+        limits.check_nodes(size(root))
+        chain = explore(self.task, root, limits)
+        success = success_of(chain)
+        if success >= min(self.target, self.best.success):
+            self.best.take(root, chain, success)
+
+
+def plan_policy(
+    task: Task,
+    target: Fraction,
+    limits: Limits,
+    progress: Progress,  # noqa: ARG001
+    options: Options = DEFAULTS,
+    *,
+    whole: bool = False,
+) -> Plan:
+    """Plan by policy synthesis. Always returns; where a limit is reached, with the best that is known
+    by then. Only with ``whole`` it raises ``LimitReached`` instead where the task has more states than
+    the limit."""
+    goal: Node = numbered(ConditionNode("", task.goal))
+    search = _Search(
+        task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole
+    )
+    search.run()
+    if whole and search.stop is not None:
+        raise LimitReached([search.stop])
+    plan = search.best.plan("interrupted" if search.interrupted else "limit-reached", search.stop)
+    lower = max(search.bounds.lower, plan.figures.success)
+    upper = max(search.bounds.upper, lower)
+    status = plan.tree.status
+    if status == "limit-reached" and upper < target:
+        status = "out-of-reach"
+    return replace(plan, tree=replace(plan.tree, status=status, bounds=(lower, upper)))

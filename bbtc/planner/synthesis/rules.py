@@ -1,0 +1,198 @@
+"""From the states that matter to a short list of rules: "if these literals hold, do this action".
+
+Rules are tried in order. They are found greedily, the one that decides most states for its size
+first (separate and conquer: Fürnkranz 1999); after each, states that no run visits any more are
+forgotten, so later rules need to tell fewer states apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from bbtc.ground.condition import And, Condition, Is, Known, Not, Or
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.transitions import Index
+from bbtc.planner.synthesis.permissive import Offers
+
+
+class Test(IntEnum):
+    """What a literal tests of its variable; each is two-valued."""
+
+    TRUE = 0
+    FALSE = 1
+    UNKNOWN = 2
+    KNOWN = 3
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Literal:
+    """A two-valued test of one variable."""
+
+    variable: int
+    test: Test
+
+    @property
+    def condition(self) -> Condition:
+        """As a condition; for true and false it is unknown where the variable is."""
+        match self.test:
+            case Test.TRUE:
+                return Is(self.variable, Truth.TRUE)
+            case Test.FALSE:
+                return Is(self.variable, Truth.FALSE)
+            case Test.UNKNOWN:
+                return Is(self.variable, Truth.UNKNOWN)
+            case Test.KNOWN:
+                return Known(self.variable)
+
+    def holds(self, values: npt.NDArray[np.uint8]) -> Flags:
+        """In which rows of values it holds."""
+        column = values[:, self.variable]
+        match self.test:
+            case Test.TRUE:
+                found: Flags = column == Truth.TRUE
+            case Test.FALSE:
+                found = column == Truth.FALSE
+            case Test.UNKNOWN:
+                found = column == Truth.UNKNOWN
+            case Test.KNOWN:
+                found = column != Truth.UNKNOWN
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """Do ``action`` (its number in the task) where all of ``tests`` hold. ``asked`` are the states
+    (local numbers) in which the rule is looked at and none before it applied."""
+
+    tests: tuple[Literal, ...]
+    action: int
+    asked: Index
+
+
+class Learner:
+    """Finds rules for the offers of a policy."""
+
+    def __init__(self, task: Task, offers: Offers, limits: Limits) -> None:
+        self.task, self.offers, self.limits = task, offers, limits
+        self.literals = _literals(offers.values)
+        columns = [literal.holds(offers.values) for literal in self.literals]
+        self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(offers.goal), len(self.literals))
+        self.owner = np.repeat(np.arange(len(offers.goal)), np.diff(offers.first))
+        self.taken = np.ones(len(offers.action), dtype=np.bool_)
+        self._own: dict[int, npt.NDArray[np.float64]] = {}
+
+    def relevant(self) -> Flags:
+        """The states that runs may still visit."""
+        return self.offers.reached(self.taken)
+
+    def learn(self, group: Flags, avoid: Flags) -> list[Rule]:
+        """Rules that decide every state of ``group`` that has offers, and apply in none of
+        ``avoid`` (nor in a state of the group without offers). Offers that the rules do not take
+        are dropped from :attr:`taken`."""
+        rules: list[Rule] = []
+        decided = np.zeros(len(self.offers.goal), dtype=np.bool_)
+        active = np.diff(self.offers.first) > 0
+        while True:
+            self.limits.check_time("the search for a small tree")
+            relevant = self.relevant()
+            waiting = np.flatnonzero(relevant & group & active & ~decided)
+            if not len(waiting):
+                return rules
+            against = np.flatnonzero(relevant & ~decided & ((group & ~active & ~self.offers.idle) | avoid))
+            tests, action, covered = self._best_rule(waiting, against)
+            rules.append(Rule(tests, action, np.concatenate([waiting, against])))
+            decided[covered] = True
+            ours = np.zeros(len(decided), dtype=np.bool_)
+            ours[covered] = True
+            self.taken &= ~ours[self.owner] | (self.offers.action == action)
+
+    def _best_rule(self, waiting: Index, against: Index) -> tuple[tuple[Literal, ...], int, Index]:
+        """The rule that decides most of the waiting states for its size."""
+        in_waiting = np.zeros(len(self.offers.goal), dtype=np.bool_)
+        in_waiting[waiting] = True
+        offers = np.flatnonzero(self.taken & in_waiting[self.owner])
+        actions = np.unique(self.offers.action[offers])
+        best: tuple[tuple[float, int], tuple[int, ...], int, Index] | None = None
+        for action in actions.tolist():
+            able = np.zeros(len(self.offers.goal), dtype=np.bool_)
+            able[self.owner[offers[self.offers.action[offers] == action]]] = True
+            wanted, others = waiting[able[waiting]], np.concatenate([waiting[~able[waiting]], against])
+            # At best it decides all of them: with one test, or without any if there is nothing to tell apart.
+            at_best = (-len(wanted) / 3, 1) if len(others) else (-float(len(wanted)), 0)
+            if best is not None and best[0] <= at_best:
+                continue
+            columns, covered = self._grow(action, wanted, others)
+            size = len(columns) + 2 if columns else 1
+            key = (-len(covered) / size, len(columns))
+            if best is None or key < best[0]:
+                best = key, columns, action, covered
+        assert best is not None
+        _, columns, action, covered = best
+        return tuple(self.literals[column] for column in columns), action, covered
+
+    def _grow(self, action: int, wanted: Index, others: Index) -> tuple[tuple[int, ...], Index]:
+        """A conjunction that holds in some of the wanted states and in none of the others."""
+        own = self._own_literals(action)
+        inside, outside = self.holds[wanted], self.holds[others]
+        chosen: list[int] = []
+        while len(outside):
+            hits, misses = inside.sum(axis=0), outside.sum(axis=0)
+            useful = (hits > 0) & (misses < len(outside))
+            share = np.log2(np.maximum(hits, 1) / np.maximum(hits + misses, 1))
+            gain = hits * (share - np.log2(len(inside) / (len(inside) + len(outside))))
+            gain = np.where(useful, gain + own * 1e-6, -np.inf)
+            column = int(np.argmax(gain))
+            chosen.append(column)
+            inside, outside = inside[inside[:, column]], outside[outside[:, column]]
+        # Drop tests that later ones made needless, the first chosen first.
+        for column in list(chosen):
+            rest = [c for c in chosen if c != column]
+            if not self.holds[others][:, rest].all(axis=1).any():
+                chosen = rest
+        covered = wanted[self.holds[wanted][:, chosen].all(axis=1)]
+        return tuple(chosen), covered
+
+    def _own_literals(self, action: int) -> npt.NDArray[np.float64]:
+        """1 for literals that the action's precondition states: they read best."""
+        if action not in self._own:
+            own = frozenset(_stated(self.task.actions[action].precondition))
+            self._own[action] = np.array([float(literal in own) for literal in self.literals])
+        return self._own[action]
+
+
+def _literals(values: npt.NDArray[np.uint8]) -> list[Literal]:
+    """The literals that tell some of the states apart, one of each set that hold alike."""
+    found: dict[bytes, Literal] = {}
+    for variable in range(values.shape[1]):
+        present = set(values[:, variable].tolist())
+        tests = [Test.TRUE, Test.FALSE]
+        if Truth.UNKNOWN in present:
+            tests += [Test.UNKNOWN, Test.KNOWN]
+        for test in tests:
+            literal = Literal(variable, test)
+            holds = literal.holds(values)
+            if holds.any() and not holds.all():
+                found.setdefault(holds.tobytes(), literal)
+    return sorted(found.values())
+
+
+def _stated(condition: Condition) -> list[Literal]:
+    match condition:
+        case Is(variable, value):
+            test = {Truth.TRUE: Test.TRUE, Truth.FALSE: Test.FALSE, Truth.UNKNOWN: Test.UNKNOWN}[value]
+            return [Literal(variable, test)]
+        case Known(variable):
+            return [Literal(variable, Test.KNOWN)]
+        case And(parts) | Or(parts):
+            return [literal for part in parts for literal in _stated(part)]
+        case Not(part):
+            return _stated(part)
+        case _:
+            return []

@@ -1,0 +1,179 @@
+"""From rules to a readable tree: ``Fallback(goal, Sequence(tests…, action), …)``.
+
+Where the goal can be unknown, its rules stand under a Skipper: ``Fallback(Skipper(goal, rules for
+unknown), rules for false…)``. Neighbouring rules for one action share its node, and neighbours that
+share a test stand under it together, where that saves nodes. Actions are not latched: a rule that
+applies again tries again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from bbtc.ground.condition import FALSE, Condition, compile_condition, conjuncts
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.transitions import Index
+from bbtc.planner.synthesis.permissive import Offers
+from bbtc.planner.synthesis.rules import Learner, Literal, Rule, Test
+from bbtc.rewrite.simplify import numbered
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
+
+_MOST_LOOKS = 5_000
+"""How many rules are looked at, again and again, for tests to share: every run of rules that share one is
+tried, and what is left and right of it and in it, which takes exponential time where little is shared."""
+
+
+def synthesize(task: Task, offers: Offers, limits: Limits) -> Node:
+    """A tree that takes one of the offers in every state a run visits, and otherwise fails.
+    Raises ``LimitReached`` when the time is over."""
+    return numbered(_tree(task, offers, limits, fall_through=False))
+
+
+def in_phases(task: Task, phases: Sequence[tuple[int, Offers]], limits: Limits) -> Node:
+    """Trees for offers that follow one another, each after so many actions of the one before.
+    Raises ``LimitReached`` when the time is over."""
+    parts: list[Node] = []
+    for number, (steps, offers) in enumerate(phases, 1):
+        tree = _tree(task, offers, limits, fall_through=number < len(phases))
+        parts.append(ControlNode("", "retry", (tree,), attempts=steps))
+    return numbered(_control("fallback", parts) if parts else ConditionNode("", task.goal))
+
+
+def _tree(task: Task, offers: Offers, limits: Limits, *, fall_through: bool) -> Node:
+    """``fall_through``: fail where the goal is unknown and nothing is done about it, so that what
+    follows gets its turn."""
+    goal = _truths(task.goal, offers.values)
+    unknown: Flags = goal == Truth.UNKNOWN
+    false: Flags = goal == Truth.FALSE
+    nowhere = np.zeros_like(unknown)
+    learner = Learner(task, offers, limits)
+    ending = np.diff(offers.first) == 0
+    watching = learner.learn(unknown, nowhere)
+    acting = learner.learn(false, unknown & ending)
+    node = _goal_node(task, offers.values[learner.relevant()])
+    build = _Builder(task, offers.values, limits)
+    if watching:
+        node = _control("skipper", [node, build.choice(build.rules(watching))])
+    elif fall_through and (unknown & learner.relevant()).any():
+        node = _control("skipper", [node, ConditionNode("", FALSE)])
+    children = build.rules(acting)
+    return _control("fallback", [node, *children]) if children else node
+
+
+def _truths(condition: Condition, values: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+    test = compile_condition(condition)
+    return np.array([int(test(row)) for row in values.tolist()], dtype=np.int64)
+
+
+def _goal_node(task: Task, values: npt.NDArray[np.uint8]) -> Node:
+    """The goal, a node for each of its parts unless some part may be unknown: in a Sequence, an
+    unknown part would hide a false one behind it."""
+    parts = conjuncts(task.goal)
+    if len(parts) < 2 or any((_truths(part, values) == Truth.UNKNOWN).any() for part in parts):
+        return ConditionNode("", task.goal)
+    return _control("sequence", [ConditionNode("", part) for part in parts])
+
+
+def _control(kind: ControlKind, children: Sequence[Node]) -> Node:
+    return children[0] if len(children) == 1 else ControlNode("", kind, tuple(children))
+
+
+def _size(nodes: Sequence[Node]) -> int:
+    return sum(1 for node in nodes for _ in walk(node))
+
+
+@dataclass(slots=True)
+class _Builder:
+    task: Task
+    values: npt.NDArray[np.uint8]
+    limits: Limits
+    left: int = _MOST_LOOKS
+    """Rules that may still be looked at for tests to share."""
+
+    def choice(self, children: list[Node]) -> Node:
+        return _control("fallback", children)
+
+    def rules(self, rules: Sequence[Rule]) -> list[Node]:
+        """The rules as children of a Fallback, in order."""
+        self.limits.check_time("the search for a small tree")
+        self.left -= len(rules)
+        best = self._flat(rules)
+        for literal, start, end in self._shared(rules):
+            inner = [replace(r, tests=tuple(t for t in r.tests if t != literal)) for r in rules[start:end]]
+            if not self._settled([literal], rules[start].asked):
+                continue
+            if self.left < 0:
+                break
+            asked = rules[start].asked[literal.holds(self.values[rules[start].asked])]
+            inner[0] = replace(inner[0], asked=asked)
+            branch = _control(
+                "sequence", [ConditionNode("", literal.condition), self.choice(self.rules(inner))]
+            )
+            nodes = [*self.rules(rules[:start]), branch, *self.rules(rules[end:])]
+            if _size(nodes) < _size(best):
+                best = nodes
+                break
+        return best
+
+    def _shared(self, rules: Sequence[Rule]) -> list[tuple[Literal, int, int]]:
+        """Runs of neighbouring rules that share a test, the longest first."""
+        found: list[tuple[Literal, int, int]] = []
+        for literal in sorted({test for rule in rules for test in rule.tests}):
+            start = None
+            for position in range(len(rules) + 1):
+                inside = position < len(rules) and literal in rules[position].tests
+                if inside and start is None:
+                    start = position
+                elif not inside and start is not None:
+                    if position - start > 1:
+                        found.append((literal, start, position))
+                    start = None
+        return sorted(found, key=lambda run: (run[1] - run[2], run[0]))
+
+    def _flat(self, rules: Sequence[Rule]) -> list[Node]:
+        nodes: list[Node] = []
+        position = 0
+        while position < len(rules):
+            rule = rules[position]
+            alike = [rule]
+            while position + len(alike) < len(rules) and rules[position + len(alike)].action == rule.action:
+                alike.append(rules[position + len(alike)])
+            action = ActionNode("", self.task.actions[rule.action].name, latched=False)
+            if all(each.tests for each in alike) and len(alike) > 1:
+                tests = [_control("sequence", self._conditions(each)) for each in alike]
+                nodes.append(_control("sequence", [self.choice(tests), action]))
+            else:
+                nodes.extend(_control("sequence", [*self._conditions(each), action]) for each in alike)
+            position += len(alike)
+        return nodes
+
+    def _conditions(self, rule: Rule) -> list[Node]:
+        """The tests of a rule, in an order in which none is ever unknown; where there is no such
+        order, ``known`` tests come before."""
+        waiting = list(rule.tests)
+        asked = rule.asked
+        nodes: list[Node] = []
+        while waiting:
+            literal = next((t for t in waiting if self._settled([t], asked)), None)
+            if literal is None:
+                literal = Literal(waiting[0].variable, Test.KNOWN)
+            else:
+                waiting.remove(literal)
+            nodes.append(ConditionNode("", literal.condition))
+            asked = asked[literal.holds(self.values[asked])]
+        return nodes
+
+    def _settled(self, tests: Sequence[Literal], asked: Index) -> bool:
+        """Is none of the tests unknown in any of the states?"""
+        return all(
+            test.test in {Test.UNKNOWN, Test.KNOWN}
+            or not (self.values[asked, test.variable] == Truth.UNKNOWN).any()
+            for test in tests
+        )

@@ -1,0 +1,95 @@
+"""Smaller trees that still reach the target: alternatives that it does not take are dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from bbtc.belief.absorption import Absorption
+from bbtc.belief.chain import Chain, explore
+from bbtc.belief.soundness import violations
+from bbtc.belief.state import Transition
+from bbtc.belief.tick import Status
+from bbtc.diagnostics import LimitReached
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.rewrite.simplify import simplified, size
+from bbtc.tree.nodes import ControlNode, Node, actions_of
+
+_MOST_STATES = 50_000
+"""States of all simulations together."""
+
+
+def shrunk(
+    task: Task, root: Node, target: Fraction, limits: Limits, transitions: dict[str, Transition] | None = None
+) -> Node:
+    """The tree without those alternatives of its Fallbacks that the target does not need: one after
+    the other is dropped, the largest first, as long as the exact success probability stays at the
+    target or above. Where the tree does no better than that from the start, neither success nor expected
+    cost may get worse. What is left is simplified.
+    Raises ``LimitReached`` when the time is over.
+    """
+    transitions = {} if transitions is None else transitions
+    chain = explore(task, root, limits, transitions)
+    work = len(chain.states)
+    before = _Worth.of(chain)
+    dropped = True
+    while dropped:
+        dropped = False
+        for smaller in sorted(_without_one(root), key=size):
+            limits.check_time("the search for a small tree")
+            if work > _MOST_STATES:
+                return root
+            narrow = replace(limits, states=min(limits.states, 4 * len(chain.states)))
+            try:
+                other = explore(task, smaller, narrow, transitions)
+            except LimitReached:
+                continue
+            work += len(other.states)
+            if _Worth.of(other).will_do(before, target) and not violations(task, other):
+                root = simplified(task, smaller, limits, transitions)
+                dropped = True
+                break
+    return root
+
+
+@dataclass(frozen=True, slots=True)
+class _Worth:
+    """Probabilities of success and of never ending, and the expected cost (None: infinite)."""
+
+    success: Fraction
+    endless: Fraction
+    cost: Fraction | None
+
+    @classmethod
+    def of(cls, chain: Chain) -> _Worth:
+        visits = Absorption(chain).visits()
+        ends = {status: Fraction(0) for status in Status}
+        for state in chain.final:
+            ends[chain.status[state]] += visits[state] or 0
+        endless = 1 - sum(ends.values(), Fraction(0))
+        cost = Fraction(0)
+        for visit, edges in zip(visits, chain.edges, strict=True):
+            cost += (visit or 0) * sum((e.result.probability * e.result.cost for e in edges), Fraction(0))
+        return cls(ends[Status.SUCCESS], endless, None if endless else cost)
+
+    def will_do(self, before: _Worth, target: Fraction) -> bool:
+        """Is it good enough in place of what was before?"""
+        if self.endless > before.endless or self.success < min(before.success, target):
+            return False
+        if before.success > target or before.cost is None:
+            return True
+        return self.cost is not None and self.cost <= before.cost
+
+
+def _without_one(node: Node) -> Iterator[Node]:
+    """Trees that lack one alternative with actions."""
+    if not isinstance(node, ControlNode) or node.template is not None:
+        return
+    for at, child in enumerate(node.children):
+        rest = (*node.children[:at], *node.children[at + 1 :])
+        if node.kind in {"fallback", "skipper"} and rest and any(actions_of(child)):
+            yield rest[0] if len(rest) == 1 else replace(node, children=rest)
+        for smaller in _without_one(child):
+            yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))

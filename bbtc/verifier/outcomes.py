@@ -1,0 +1,214 @@
+"""The outcomes of actions as commands of a program.
+
+An action of few outcomes is one command that has a branch for each combination of what its factors
+can do. Of more, it is a series of stages: each draws one factor and notes in *pending* cells what is
+to be set, and the last sets it. So the size of the program is that of the action, not of the product
+of its factors, and no condition is read after an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TypeAlias
+
+from bbtc.ground.condition import variables
+from bbtc.ground.task import Charge, Effect, Factor, GroundAction, Outcome, Task, charges_of, effects_of
+from bbtc.verifier.conditions import FALSE, TRUE, UNKNOWN, where_true
+from bbtc.verifier.program import (
+    NO,
+    YES,
+    Branch,
+    Cell,
+    Charged,
+    Choose,
+    Command,
+    Compare,
+    Drafting,
+    Expression,
+    Update,
+    all_of,
+    any_of,
+    put,
+)
+
+MOST_BRANCHES = 64
+"""Branches of one command; an action of more is written in stages."""
+
+_ZERO, _ONE = Fraction(0), Fraction(1)
+_Amounts: TypeAlias = tuple[Fraction, Fraction, Fraction]  # actions, cost, reward
+_Drawn: TypeAlias = tuple[Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction]
+
+
+def relevant(task: Task, actions: Iterable[GroundAction], read: Iterable[int]) -> list[int]:
+    """The variables on which those ``read`` depend, by way of the conditions of effects, in order, and those
+    on which costs and rewards do. The others can change, but change nothing that matters."""
+    actions = list(actions)
+    effects = [effect for action in actions for effect in effects_of(action.factors)]
+    charges = (charge for action in actions for charge in charges_of(action.factors))
+    needed = {*read, *(variable for charge in charges for variable in variables(charge.when))}
+    while True:
+        more = {
+            variable
+            for effect in effects
+            if effect.when is not None and any(target in needed for target, _ in effect.sets)
+            for variable in variables(effect.when)
+        }
+        if more <= needed:
+            return [index for index in range(len(task.variables)) if index in needed]
+        needed |= more
+
+
+@dataclass(slots=True)
+class Outcomes:
+    """Writes what follows the start of an action. ``cell_of`` gives the cells of the relevant
+    variables; ``commands`` are those of the stages."""
+
+    draft: Drafting
+    cell_of: Mapping[int, int]
+    most_branches: int = MOST_BRANCHES
+    commands: list[Command] = field(default_factory=list)
+    stage: int | None = None
+    _stages: int = 1  # 0: no action is under way; 1: the outcome is drawn, and applies now
+    _pending: dict[int, int] = field(default_factory=dict)
+    _entry: dict[str, int] = field(default_factory=dict)
+
+    def prepare(self, actions: Sequence[GroundAction]) -> None:
+        """Write the stages of those actions that need them."""
+        staged = [action for action in actions if _combinations(action.factors) > self.most_branches]
+        if not staged:
+            return
+        self.stage = self.draft.cell(Cell("control", "stage", "stage of the outcome being drawn; 0: none", 0))
+        touched = {v for action in staged for effect in effects_of(action.factors) for v, _ in effect.sets}
+        for variable in sorted(touched & self.cell_of.keys()):
+            of = self.draft.cells[self.cell_of[variable]]
+            self._pending[variable] = self.draft.cell(
+                Cell("pending", of.subject, "what it becomes: 0 as it is, 1 false, 2 unknown, 3 true", 3)
+            )
+        for action in staged:
+            self._entry[action.name] = self._series(action.factors, 1)
+        highest = self._stages
+        self.draft.cells[self.stage] = Cell("control", "stage", self.draft.cells[self.stage].meaning, highest)
+        apply = [
+            Choose(self.cell_of[v], tuple((Compare(p, "=", value + 1), value) for value in (0, 1, 2)))
+            for v, p in self._pending.items()
+        ]
+        clear = [put(pending, 0) for pending in self._pending.values()]
+        after = Branch(_ONE, (*apply, *clear, put(self.stage, 0)), (_ZERO, _ZERO, _ZERO))
+        self.commands.append(Command(None, Compare(self.stage, "=", 1), (after,), "the outcome applies"))
+
+    @property
+    def idle(self) -> Expression:
+        """Is no outcome being drawn?"""
+        return YES if self.stage is None else Compare(self.stage, "=", 0)
+
+    def branches(self, action: GroundAction, updates: Sequence[Update]) -> tuple[Branch, ...]:
+        """What may happen when the action starts; ``updates`` happen in any case."""
+        if action.name in self._entry:
+            assert self.stage is not None
+            rewards = (_ONE, action.cost, _ZERO)
+            return (Branch(_ONE, (*updates, put(self.stage, self._entry[action.name])), rewards),)
+        merged: dict[tuple[tuple[Update, ...], _Amounts, tuple[Charged, ...]], Fraction] = {}
+        for probability, effects, charges, cost, reward in _draws(action.factors):
+            if probability:
+                amounts = (_ONE, action.cost + cost, reward)
+                key = ((*updates, *self._set(effects)), amounts, self._charges(charges))
+                merged[key] = merged.get(key, _ZERO) + probability
+        return tuple(
+            Branch(p, changed, amounts, charges) for (changed, amounts, charges), p in merged.items()
+        )
+
+    # --- one command --------------------------------------------------------------------------
+
+    def _set(self, effects: Sequence[Effect]) -> Iterator[Update]:
+        """Where several effects set a variable, true wins over unknown, and that over false."""
+        for variable, guards in self._guards(effects).items():
+            cases: list[tuple[Expression, int]] = []
+            for value in (TRUE, UNKNOWN, FALSE):
+                if guards[value] != NO:
+                    cases.append((guards[value], value))
+                if guards[value] == YES:
+                    break
+            yield Choose(self.cell_of[variable], tuple(cases))
+
+    def _guards(self, effects: Sequence[Effect]) -> dict[int, list[Expression]]:
+        """Of each relevant variable that is set: where it is set to false, to unknown, to true."""
+        found: dict[int, list[Expression]] = {}
+        for effect in effects:
+            sets = [(variable, value) for variable, value in effect.sets if variable in self.cell_of]
+            when = where_true(effect.when, self.cell_of) if effect.when is not None and sets else YES
+            for variable, value in sets if when != NO else ():
+                guards = found.setdefault(variable, [NO, NO, NO])
+                guards[value] = any_of(guards[value], when)
+        return {variable: found[variable] for variable in sorted(found)}
+
+    def _charges(self, charges: Iterable[Charge]) -> tuple[Charged, ...]:
+        """What the charges add, by condition."""
+        found: dict[Expression, _Amounts] = {}
+        for charge in charges:
+            when = where_true(charge.when, self.cell_of)
+            _, cost, reward = found.get(when, (_ZERO, _ZERO, _ZERO))
+            if when != NO:
+                found[when] = (_ZERO, cost + charge.cost, reward + charge.reward)
+        return tuple(Charged(when, amounts) for when, amounts in found.items())
+
+    # --- in stages ----------------------------------------------------------------------------
+
+    def _series(self, factors: Sequence[Factor], after: int) -> int:
+        """Write the stages that draw the factors, then go to the stage ``after``; the first one."""
+        for factor in reversed(factors):
+            after = self._draw(factor, after)
+        return after
+
+    def _draw(self, factor: Factor, after: int) -> int:
+        assert self.stage is not None
+        branches = []
+        for outcome in factor.outcomes:
+            if outcome.probability:
+                then = put(self.stage, self._series(outcome.factors, after))
+                updates = (*self._note(outcome), then)
+                amounts = (_ZERO, outcome.cost, outcome.reward)
+                charges = self._charges(outcome.charges)
+                branches.append(Branch(outcome.probability, updates, amounts, charges))
+        self._stages += 1
+        own = self._stages
+        self.commands.append(
+            Command(None, Compare(self.stage, "=", own), tuple(branches), "a factor is drawn")
+        )
+        return own
+
+    def _note(self, outcome: Outcome) -> Iterator[Update]:
+        for variable, guards in self._guards(outcome.effects).items():
+            pending = self._pending[variable]
+            cases = [
+                (all_of(guards[value], Compare(pending, "<", value + 1)), value + 1)
+                for value in (TRUE, UNKNOWN, FALSE)
+                if guards[value] != NO
+            ]
+            yield Choose(pending, tuple(cases))
+
+
+def _combinations(factors: Sequence[Factor]) -> int:
+    product = 1
+    for factor in factors:
+        product *= sum(_combinations(outcome.factors) for outcome in factor.outcomes)
+    return product
+
+
+def _draws(factors: Sequence[Factor]) -> Iterator[_Drawn]:
+    """Every combination of outcomes: probability, effects, charges, cost, reward."""
+    if not factors:
+        yield _ONE, (), (), _ZERO, _ZERO
+        return
+    *before, last = factors
+    for p, effects, charges, cost, reward in _draws(before):
+        for outcome in last.outcomes:
+            for p2, effects2, charges2, cost2, reward2 in _draws(outcome.factors):
+                yield (
+                    p * outcome.probability * p2,
+                    (*effects, *outcome.effects, *effects2),
+                    (*charges, *outcome.charges, *charges2),
+                    cost + outcome.cost + cost2,
+                    reward + outcome.reward + reward2,
+                )

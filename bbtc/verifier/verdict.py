@@ -1,0 +1,141 @@
+"""Does a tree do what it claims? Its figures, recomputed without the simulator and the planner."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal, TypeAlias
+
+from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.limits import Limits
+from bbtc.rounding import decimal
+from bbtc.tree.nodes import Tree
+from bbtc.verifier import storm
+from bbtc.verifier.chain import chain_of, solvable_chain
+from bbtc.verifier.explore import explore
+from bbtc.verifier.prism import counted
+from bbtc.verifier.program import REWARDS, Program
+from bbtc.verifier.solve import Recomputed, recompute
+
+Engine: TypeAlias = Literal["auto", "own", "storm", "all"]
+
+TOLERANCE = Fraction(1, 10**9)
+"""The greatest difference between a claim and what Storm found; of our own solver, which is exact, none
+is taken."""
+
+_LONGEST = 10**25  # denominator of a number shown as a fraction
+
+
+@dataclass(frozen=True, slots=True)
+class StormFigures:
+    """What Storm found: bounds, equal where it computed exactly (None: infinite)."""
+
+    version: str
+    states: int
+    exact: bool
+    figures: tuple[tuple[str, storm.Answer], ...]
+
+    @property
+    def success(self) -> storm.Answer:
+        """The probability of success."""
+        return dict(self.figures)["success"]
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The figures that each engine found (None: it was not asked), and every disagreement."""
+
+    tree: Tree
+    own: Recomputed | None
+    storm: StormFigures | None
+    problems: tuple[Diagnostic, ...]
+
+    def raise_problems(self) -> None:
+        """Raise :class:`BbtcError` unless the tree is what it claims to be."""
+        if self.problems:
+            raise BbtcError(self.problems)
+
+
+def verify(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
+    """Recompute the figures of a tree. ``auto`` asks Storm, too, where it is installed.
+
+    Raises ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer; what
+    disagrees stands in the verdict.
+    """
+    own = found = None
+    if engine != "storm":
+        own = recompute(explore(solvable_chain(tree.task, tree.root), limits), limits)
+    if engine in {"storm", "all"} or (engine == "auto" and storm.is_installed()):
+        found = _ask_storm(chain_of(tree.task, tree.root), limits)
+    return Verdict(tree, own, found, tuple(_problems(tree, own, found)))
+
+
+def _ask_storm(program: Program, limits: Limits) -> StormFigures:
+    properties = {end: f'P=? [F "{end}"]' for end in ("success", "failure", "blocked")}
+    for number in counted(program):
+        properties[REWARDS[number]] = f'R{{"{REWARDS[number]}"}}=? [F "finished"]'
+    answers = storm.ask(program, list(properties.values()), limits)
+    figures = tuple(zip(properties, answers.values, strict=True))
+    return StormFigures(answers.version, answers.states, answers.exact, figures)
+
+
+def _problems(tree: Tree, own: Recomputed | None, found: StormFigures | None) -> Iterator[Diagnostic]:
+    claimed = tree.success_probability
+    if own is not None and own.success != claimed:
+        yield _disagreement(
+            f"the tree claims a success probability of {_shown(claimed)}; it is {_shown(own.success)}"
+        )
+    if found is not None and not _agree(found.success, claimed):
+        told = _shown(found.success.lower or Fraction(0))
+        yield _disagreement(f"the tree claims a success probability of {_shown(claimed)}; Storm finds {told}")
+    if own is not None and found is not None:
+        for name, answer in found.figures:
+            if not _agree(answer, own.figure(name)):
+                yield _disagreement(f"the figure '{name}': our solver and Storm disagree")
+    yield from _contradictions(tree)
+    if own is not None:
+        yield from _unsound(own)
+
+
+def _agree(answer: storm.Answer, value: Fraction | None) -> bool:
+    """Is the value at most the tolerance outside the bounds? It is relative where values exceed 1."""
+    if value is None or answer.lower is None or answer.upper is None:
+        return value is None and answer.lower is None
+    slack = TOLERANCE * max(Fraction(1), abs(value))
+    return answer.lower - slack <= value <= answer.upper + slack
+
+
+def _contradictions(tree: Tree) -> Iterator[Diagnostic]:
+    """What the tree says about itself that cannot all be true."""
+    claimed = tree.success_probability
+    contradicted = tree.status == ("out-of-reach" if claimed >= tree.target else "target-reached")
+    if contradicted:
+        yield _disagreement(
+            f"the status is '{tree.status}', but the target is {_shown(tree.target)} and the claim "
+            f"{_shown(claimed)}"
+        )
+    if tree.bounds is not None and claimed > tree.bounds[1]:
+        yield _disagreement(
+            f"the tree claims {_shown(claimed)}, more than the {_shown(tree.bounds[1])} that it says any "
+            "policy can reach"
+        )
+
+
+def _unsound(own: Recomputed) -> Sequence[Diagnostic]:
+    found = []
+    if own.without_goal:
+        found.append(
+            f"with probability {_shown(own.without_goal)} the tree succeeds where the goal is not true"
+        )
+    if own.unready:
+        found.append("an action can start where its precondition is not true")
+    return [Diagnostic("BBT0802", message) for message in found]
+
+
+def _disagreement(message: str) -> Diagnostic:
+    return Diagnostic("BBT0801", message)
+
+
+def _shown(value: Fraction) -> str:
+    return str(value) if value.denominator < _LONGEST else f"≈ {decimal(value, 12)}"
