@@ -123,6 +123,18 @@ def test_profiles_alone_decide_how_many_examples_are_drawn() -> None:
         profiles.load()
 
 
+def test_no_test_changes_what_is_private() -> None:
+    """Nothing whose name begins with ``_`` is set by ``setattr``, by a patch, or by assignment."""
+    called = r"\b(?:setattr|patch(?:\.\w+)?)\([^)]*[\"., ]_[a-zA-Z]\w*[\"=]"
+    private = re.compile(rf"{called}|^\s*(?!self|cls)\w+\._\w+ = ", re.MULTILINE)
+    found = {
+        path.name: private.findall(text_of(path))
+        for path in (REPOSITORY / "tests").rglob("test_*.py")
+        if path != Path(__file__)
+    }
+    assert {name: each for name, each in found.items() if each} == {}
+
+
 # --- commands --------------------------------------------------------------------------------
 
 

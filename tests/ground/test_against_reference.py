@@ -32,12 +32,12 @@ _SETTINGS = examples(60)
 
 
 _BOUNDS = {
-    (program, "_FEW"): st.integers(0, 3),
-    (program, "_MOST_ALTERNATIVES"): st.integers(1, 4),
-    (program, "_FIRST_CHAIN"): st.integers(0, 3),
+    (program, "FEW_BINDINGS"): st.integers(0, 3),
+    (program, "MOST_ALTERNATIVES"): st.integers(1, 4),
+    (program, "FIRST_CHAIN"): st.integers(0, 3),
     (bulk, "CHUNK"): st.integers(1, 3),
-    (bulk, "_MOST_SHARED"): st.integers(0, 3),
-    (relevance, "_SWEEPS"): st.integers(0, 2),
+    (bulk, "MOST_SHARED"): st.integers(0, 3),
+    (relevance, "SWEEPS"): st.integers(0, 2),
 }
 
 

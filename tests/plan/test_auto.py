@@ -89,8 +89,7 @@ def test_a_large_tree_is_worth_a_longer_second_opinion(monkeypatch: pytest.Monke
     (of,) = (task_of(p) for p in PROBLEMS if str(p) == "warehouse/blocked-aisle")
     found, small = size(plan(of, "search")), size(plan(of, "policy"))
     assert small < found
-    monkeypatch.setattr("bbtc.planner.auto._STATES_AND_ACTIONS", 1)
-    monkeypatch.setattr("bbtc.planner.auto._refine", lambda *_: None)
+    monkeypatch.setattr("bbtc.planner.auto.STATES_AND_ACTIONS", 1)
     monkeypatch.setattr("bbtc.planner.auto.LARGE_TREE", found)
     assert size(plan(of, "auto")) == found
     monkeypatch.setattr("bbtc.planner.auto.LARGE_TREE", found - 1)

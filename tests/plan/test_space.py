@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from fractions import Fraction
 from random import Random
+from unittest.mock import patch
 
 import numpy as np
 from hypothesis import given
@@ -81,12 +82,8 @@ def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> Non
 @examples(100)
 @given(task=tasks(nested=2))
 def test_actions_with_very_many_outcomes_and_disjuncts_take_another_way_to_the_same(task: Task) -> None:
-    before = space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES
-    space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES = 1, 1
-    try:
+    with patch.multiple(space_actions, MOST_OUTCOMES=1, MOST_CUBES=1):
         space = explore_space(task, Limits())
-    finally:
-        space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES = before
     assert by_arrays(space) == by_simulator(task)
 
 

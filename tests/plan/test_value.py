@@ -15,7 +15,6 @@ from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.planner.mdp import maxprob as value_module
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.exact import solve
 from bbtc.planner.mdp.explore import explore_space
@@ -157,22 +156,19 @@ def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Ta
 
 @examples(60)
 @given(of=tasks())
-def test_bounds_from_floats_hold_the_exact_values(of: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bounds_from_floats_hold_the_exact_values(of: Task) -> None:
     exact = solved(of)
     space = exact.space
-    with monkeypatch.context() as patch:
-        patch.setattr(value_module, "_MOST_EXACT", -1)
-        floats = reachability(space, Limits())
-        patch.setattr("bbtc.planner.mdp.finite_horizon._MOST_EXACT", -1)
-        horizon = horizon_values(space, 5, Limits()) if len(space.edge_target) else None
+    floats = reachability(space, Limits(), rationals=False)
+    horizon = horizon_values(space, 5, Limits(), rationals=False)
+    assert horizon.exact == (not len(space.edge_target))
     for state in range(len(space.states)):
         known, close = exact.bounds(state), floats.bounds(state)
         assert close.lower <= known.lower <= close.upper
         assert close.upper - close.lower < 1e-8
-    if horizon is not None:
-        known_horizon = horizon_values(space, 5, Limits())
-        for a, b in zip(known_horizon.initial, horizon.initial, strict=True):
-            assert b.lower <= a.lower <= b.upper
+    known_horizon = horizon_values(space, 5, Limits())
+    for a, b in zip(known_horizon.initial, horizon.initial, strict=True):
+        assert b.lower <= a.lower <= b.upper
 
 
 @examples(100)
