@@ -38,7 +38,7 @@ class Target:
     value: Truth
     states: tuple[tuple[State, Fraction], ...]
     excluded: frozenset[str] = frozenset()
-    """Names not to insert: what was inserted already and never started in these states (once
+    """Keys of candidates not to insert: what was inserted already and never started in these states (once
     more, it would not start either), and what was taken back before."""
 
     @property
@@ -65,6 +65,11 @@ class Candidate:
     def name(self) -> str:
         """The ground name of what is inserted."""
         return self.doing.name if self.doing is not None else "(a part of the disjunction)"
+
+    @property
+    def key(self) -> str:
+        """What tells it from the others of a subgoal: the ground name, or which part it is."""
+        return self.name if self.doing is not None else repr(self.conditions)
 
     @property
     def score(self) -> Fraction:
@@ -213,7 +218,9 @@ class Chooser:
             states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
             if states and frozenset(conditions) not in tried:
                 share = sum((p for _, p in states), Fraction(0)) / target.probability
-                yield Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
+                part_of_it = Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
+                if part_of_it.key not in target.excluded:
+                    yield part_of_it
 
 
 def tried_parts(subgoal: Subgoal) -> _Tried:

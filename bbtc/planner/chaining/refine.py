@@ -95,7 +95,7 @@ class _Refiner:
         best = self.finder.chooser.candidates(target)[0]
         undo = self.insert(target, best)
         refinement = Refinement("insert", *common, best.name, best.success, best.open, best.unmet)
-        return _Change(refinement, undo, (target.subgoal, target.value, best.name))
+        return _Change(refinement, undo, (target.subgoal, target.value, best.key))
 
     def insert(self, target: Target, candidate: Candidate) -> Callable[[], None]:
         """Put the candidate under the target: a perception under a Skipper where the condition is
