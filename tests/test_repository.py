@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from hypothesis import settings
 
 from bbtc.backends.registry import BUILT_INS, load_exporter
@@ -143,6 +144,26 @@ def test_the_readme_names_targets_that_exist() -> None:
     named = re.findall(r"^(?:\$ )?make (\w+)", "\n".join(blocks), re.MULTILINE)
     targets = re.findall(r"^([\w-]+):", text_of(REPOSITORY / "Makefile"), re.MULTILINE)
     assert {"demo", "test"} <= set(named) <= set(targets)
+
+
+def test_a_scheduled_job_makes_every_part_of_the_long_tests() -> None:
+    job = yaml.safe_load(text_of(REPOSITORY / ".github" / "workflows" / "test-long.yml"))
+    assert job[True]["schedule"], "YAML 1.1 reads `on` as true"
+    (work,) = job["jobs"].values()
+    made = re.findall(r"MAKE\) --keep-going (.*)", text_of(REPOSITORY / "Makefile"))
+    assert [" ".join(work["strategy"]["matrix"]["part"])] == made
+    assert work["steps"][-1]["run"].startswith("make ${{ matrix.part }} ")
+    page = text_of(REPOSITORY / "tests" / "README.md")
+    for part in made[0].split():
+        recipe = subprocess.run(
+            ["make", "--dry-run", "--always-make", part],
+            cwd=REPOSITORY,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        assert ".[dev,compare]" in recipe
+        assert f"| `make {part}` |" in page
 
 
 def test_links_between_documents_lead_somewhere() -> None:
