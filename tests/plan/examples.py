@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -32,7 +33,12 @@ class Optimum:
 
     def task(self) -> Task:
         """The ground task. Raises ``BbtcError`` where it cannot be loaded."""
-        return compile_sources([read_source(str(file)) for file in self.files], Report(), Limits(seconds=60))
+        return _task(self.files)
+
+
+@cache
+def _task(files: tuple[Path, ...]) -> Task:
+    return compile_sources([read_source(str(file)) for file in files], Report(), Limits(seconds=60))
 
 
 def cases() -> list[Optimum]:
