@@ -8,14 +8,17 @@ PROBLEM := domains/household/look-for-soda.pddl
 OUT := build/household
 BBTC := .venv/demo/bin/bbtc
 PIP_INSTALL := -m pip install --quiet --disable-pip-version-check
+MUTANTS ?= 150
+SEED ?= 0
 OLDEST_PY_TREES := build/py_trees-2.2/py_trees
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint docs format golden pictures clean python-version
+.PHONY: help demo test test-long long-forms explore mutants lint docs format golden pictures clean python-version
 
 help:
 	@echo "make demo    from the household domain to trees that run, into $(OUT)/"
 	@echo "make test    all tests"
+	@echo "make test-long  their long forms, new random examples, a sample of mutants: hours"
 	@echo "make docs    the documentation site, into site/"
 	@echo "make lint    ruff, mypy, import layers"
 	@echo "make format  lay out the Python code"
@@ -41,6 +44,20 @@ demo: .venv/demo/.installed
 
 test: .venv/dev/.installed $(OLDEST_PY_TREES)
 	.venv/dev/bin/python -m pytest $(PYTEST_ARGS)
+
+# What takes too long, or too much, for each change (tests/README.md): three parts, each of which can be
+# made alone. A part that fails keeps no other from being made: make -k.
+test-long:
+	+$(MAKE) --keep-going long-forms explore mutants
+
+long-forms: .venv/long/.installed $(OLDEST_PY_TREES)
+	BBTC_LONG=1 .venv/long/bin/python -m pytest $(PYTEST_ARGS)
+
+explore: .venv/long/.installed $(OLDEST_PY_TREES)
+	HYPOTHESIS_PROFILE=explore .venv/long/bin/python -m pytest $(PYTEST_ARGS)
+
+mutants: .venv/long/.installed $(OLDEST_PY_TREES)
+	.venv/long/bin/python -m tests.mutation --count $(MUTANTS) --seed $(SEED) --jobs 2
 
 # --- for those who work on it ----------------------------------------------------------------
 
@@ -79,11 +96,12 @@ clean:
 
 .venv/demo/.installed: EXTRA := py-trees
 .venv/dev/.installed: EXTRA := dev
+.venv/long/.installed: EXTRA := dev,compare
 
 .venv/%/.installed: pyproject.toml | python-version
 	$(PYTHON) -m venv $(@D)
 	$(@D)/bin/python $(PIP_INSTALL) --editable ".[$(EXTRA)]"
-	@[ $* != dev ] || $(@D)/bin/python $(PIP_INSTALL) --only-binary stormpy --editable ".[storm]" || \
+	@[ $* = demo ] || $(@D)/bin/python $(PIP_INSTALL) --only-binary stormpy --editable ".[storm]" || \
 	  echo "No wheel of Storm fits this system: the tests that compare with it are skipped." >&2
 	@touch $@
 

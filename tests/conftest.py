@@ -9,13 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 
-# The same examples every time, so that a run tells about the change at hand and nothing else, and no
-# time limit for one example, which a busy machine would exceed. HYPOTHESIS_PROFILE=explore draws new ones.
-settings.register_profile("steady", derandomize=True, deadline=None)
-settings.register_profile("explore", deadline=None, max_examples=1000)
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
+from tests import profiles as _profiles  # noqa: F401 - loads one
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # As in a shell's background job. Processes inherit it, and those that tests start shall hear Ctrl-C.
@@ -94,26 +89,11 @@ def repository() -> Path:
     return REPOSITORY
 
 
-def shared_folder() -> Path | None:
-    """The folder of shared inputs beside the repository, if it is there."""
-    folder = REPOSITORY.parent / "shared"
-    return folder if folder.is_dir() else None
-
-
 def corpus_folder() -> Path | None:
     """The corpus of public planning files: ``$BBTC_CORPUS``, or ``corpus`` in the shared folder."""
     named = os.environ.get("BBTC_CORPUS")
     folder = Path(named) if named else REPOSITORY.parent / "shared" / "corpus"
     return folder if folder.is_dir() else None
-
-
-@pytest.fixture(scope="session")
-def shared() -> Path:
-    """The folder of shared inputs; skips the test where it is absent."""
-    folder = shared_folder()
-    if folder is None:
-        pytest.skip("no folder ../shared beside the repository")
-    return folder
 
 
 @pytest.fixture(scope="session")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from fractions import Fraction
 from typing import Literal
 
 from hypothesis import strategies as st
 
-from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or, evaluate
 from bbtc.ground.task import (
     Body,
     BodyAction,
@@ -70,78 +71,141 @@ BODY_KINDS: list[Literal["sequence", "fallback", "skipper"]] = ["sequence", "fal
 STATUSES: list[PlanStatus] = ["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
 
 
-@st.composite
-def distributions(draw: st.DrawFn, most: int = 3) -> list[Fraction]:
-    """Positive probabilities that sum to 1."""
-    weights = draw(st.lists(st.integers(1, 9), min_size=1, max_size=most))
-    return [Fraction(weight, sum(weights)) for weight in weights]
+# A random task takes hundreds of choices, and what Hypothesis does for each costs more than what most tests
+# do with the task. So choices that belong together are one choice, from a list that is made once.
+
+_DISTRIBUTIONS = st.sampled_from(
+    [
+        tuple(Fraction(weight, sum(weights)) for weight in weights)
+        for count in (1, 2, 3)
+        for weights in itertools.product(range(1, 10), repeat=count)
+        for _ in range(9 ** (3 - count))
+    ]
+)
+
+
+def distributions() -> st.SearchStrategy[tuple[Fraction, ...]]:
+    """One to three positive probabilities that sum to 1."""
+    return _DISTRIBUTIONS
 
 
 def conditions(variables: tuple[Variable, ...]) -> st.SearchStrategy[Condition]:
     """Conditions over the variables of a task, of every kind."""
-    return _conditions(len(variables))
+    return _conditions(len(variables), 2)
 
 
-# One strategy for all tasks of a size: making strategies anew costs more than drawing from them.
 @functools.cache
-def _conditions(count: int) -> st.SearchStrategy[Condition]:
-    constants: st.SearchStrategy[Condition] = st.builds(Constant, st.booleans())
-    if not count:
-        return constants
-    index = st.integers(0, count - 1)
-    atoms = st.one_of(
-        st.builds(Is, index, st.sampled_from([Truth.TRUE, Truth.FALSE])),
-        st.builds(Is, index, st.just(Truth.UNKNOWN)),
-        st.builds(Known, index),
-        constants,
-    )
-    return st.recursive(
-        atoms,
-        lambda inner: st.one_of(
-            st.builds(And, st.lists(inner, max_size=3).map(tuple)),
-            st.builds(Or, st.lists(inner, max_size=3).map(tuple)),
-            st.builds(Not, inner),
-        ),
-        max_leaves=4,
+def _conditions(count: int, depth: int) -> st.SearchStrategy[Condition]:
+    return _condition(_atoms(count), depth)
+
+
+@functools.cache
+def _atoms(count: int) -> st.SearchStrategy[Condition]:
+    found: list[Condition] = [Constant(True), Constant(False)]
+    for i in range(count):
+        found += [Is(i, Truth.TRUE), Is(i, Truth.FALSE), Is(i, Truth.UNKNOWN), Known(i)]
+    return st.sampled_from(found)
+
+
+_COMPOUNDS = [(Not, 1), (Not, 1), *((kind, size) for kind in (And, Or) for size in (0, 1, 2, 2, 3))]
+_SHAPES = st.sampled_from([*[(None, 0)] * 6, *_COMPOUNDS])
+
+
+@st.composite
+def _condition(draw: st.DrawFn, atoms: st.SearchStrategy[Condition], depth: int) -> Condition:
+    def condition(level: int) -> Condition:
+        kind, size = draw(_SHAPES) if level else (None, 0)
+        parts = tuple(condition(level - 1) for _ in range(size))
+        match kind:
+            case None:
+                return draw(atoms)
+            case type() if kind is Not:
+                return Not(parts[0])
+            case _:
+                return And(parts) if kind is And else Or(parts)
+
+    return condition(depth)
+
+
+@functools.cache
+def _settings(three_valued: tuple[bool, ...]) -> st.SearchStrategy[tuple[tuple[int, Truth], ...]]:
+    """What an effect sets of so many variables: each with a chance of one in two."""
+    choices = [
+        [*[None] * len(truths), *((i, truth) for truth in truths)]
+        for i, truths in enumerate(_TRUTHS[three] for three in three_valued)
+    ]
+    return st.sampled_from(
+        [tuple(item for item in row if item is not None) for row in itertools.product(*choices)]
     )
 
 
 def _effect(draw: st.DrawFn, variables: tuple[Variable, ...]) -> Effect:
-    sets = [(i, draw(_TRUTHS[v.three_valued])) for i, v in enumerate(variables) if draw(_SOMETIMES)]
-    return Effect(draw(conditions(variables)) if draw(_SOMETIMES) else None, tuple(sets))
+    sets = draw(_settings(tuple(variable.three_valued for variable in variables)))
+    return Effect(draw(conditions(variables)) if draw(_SOMETIMES) else None, sets)
 
 
 def _charge(draw: st.DrawFn, variables: tuple[Variable, ...]) -> Charge:
-    return Charge(draw(conditions(variables)), draw(_AMOUNTS), draw(_AMOUNTS))
+    return Charge(draw(conditions(variables)), *draw(_AMOUNTS))
 
 
 def _factor(draw: st.DrawFn, variables: tuple[Variable, ...], nested: int) -> Factor:
     """A chance of up to three outcomes; chance nested in chance ``nested`` times."""
-    outcomes = [
-        Outcome(
-            probability,
-            tuple(_effect(draw, variables) for _ in range(draw(_FEW))),
-            tuple(_factor(draw, variables, nested - 1) for _ in range(draw(_FEW) if nested else 0)),
-            reward=draw(_AMOUNTS),
-            cost=draw(_AMOUNTS),
-            charges=tuple(_charge(draw, variables) for _ in range(draw(_SELDOM))),
+    probabilities, oneof = draw(_CHANCES)
+    outcomes = []
+    for probability in probabilities:
+        effects, factors, charges = draw(_SIZES if nested else _FLAT_SIZES)
+        reward, cost = draw(_AMOUNTS)
+        outcomes.append(
+            Outcome(
+                probability,
+                tuple(_effect(draw, variables) for _ in range(effects)),
+                tuple(_factor(draw, variables, nested - 1) for _ in range(factors)),
+                reward=reward,
+                cost=cost,
+                charges=tuple(_charge(draw, variables) for _ in range(charges)),
+            )
         )
-        for probability in draw(distributions())
-    ]
-    return Factor(tuple(outcomes), draw(st.booleans()))
+    return Factor(tuple(outcomes), oneof)
 
 
+def _precondition(draw: st.DrawFn, variables: tuple[Variable, ...]) -> Condition:
+    return TRUE if draw(_OFTEN) else draw(conditions(variables))
+
+
+def _goal(draw: st.DrawFn, variables: tuple[Variable, ...], initial: tuple[InitialState, ...]) -> Condition:
+    """Seldom one that holds from the start: nothing would happen."""
+    goal = draw(conditions(variables))
+    held = all(evaluate(goal, state.values) is Truth.TRUE for state in initial)
+    return Not(goal) if held and not draw(_SOMETIMES) else goal
+
+
+_CHANCES = st.tuples(_DISTRIBUTIONS, st.booleans())
 _FEW = st.sampled_from([0, 1, 1, 2])
-_SELDOM = st.sampled_from([0, 0, 0, 1, 2])
+_SIZES = st.sampled_from([*itertools.product([0, 1, 1, 1, 2, 2], [0, 1, 1, 2], [0, 0, 0, 1, 2])])
+_FLAT_SIZES = st.sampled_from([*itertools.product([0, 1, 1, 1, 2, 2], [0], [0, 0, 0, 1, 2])])
+_OFTEN = st.booleans()
 _SOMETIMES = st.sampled_from([False, False, True])
-_AMOUNTS = st.sampled_from([Fraction(0), Fraction(0), Fraction(1), Fraction(-1, 3)])
+_AMOUNTS = st.sampled_from(
+    [*itertools.product([Fraction(0), Fraction(0), Fraction(1), Fraction(-1, 3)], repeat=2)]
+)
 _COSTS = st.sampled_from([Fraction(1), Fraction(0), Fraction(1, 3), Fraction("2.5")])
-_TRUTHS = {
-    True: st.sampled_from([Truth.TRUE, Truth.FALSE, Truth.UNKNOWN]),
-    False: st.sampled_from([Truth.TRUE, Truth.FALSE]),
+_TRUTHS = {True: (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN), False: (Truth.TRUE, Truth.FALSE)}
+_FLAGS: st.SearchStrategy[tuple[bool, bool]] = st.sampled_from(
+    [(three, hidden) for three in (False, True) for hidden in (False, True)]
+)
+# Few tasks have no variable or no action: hardly anything happens in those.
+_NUMBERS = {
+    most: st.sampled_from([*range(most + 1), *range(1, most + 1), *range(2, most + 1)]) for most in (3, 4, 6)
 }
-_KINDS: list[Literal["predicate", "action"]] = ["predicate", "action"]
-_METRICS: list[Literal["cost", "reward"]] = ["cost", "reward"]
+_KINDS: st.SearchStrategy[Literal["predicate", "action"]] = st.sampled_from(["predicate", "action"])
+_METRICS: st.SearchStrategy[Literal["cost", "reward"]] = st.sampled_from(["cost", "reward"])
+_GOALS = st.sampled_from([Fraction(1), Fraction("0.9"), Fraction(2, 3)])
+_REWARDS = st.sampled_from([Fraction(0), Fraction(100)])
+
+
+@functools.cache
+def _states(three_valued: tuple[bool, ...]) -> st.SearchStrategy[tuple[Truth, ...]]:
+    return st.sampled_from([*itertools.product(*(_TRUTHS[three] for three in three_valued))])
 
 
 @st.composite
@@ -157,13 +221,13 @@ def tasks(
         return tuple(_factor(draw, variables, nested) for _ in range(draw(_FEW)))
 
     made = [
-        Variable(draw(names), args(), draw(st.booleans()), draw(st.booleans()))
-        for _ in range(draw(st.integers(0, 4)))
+        Variable(draw(names), args(), three, hidden)
+        for three, hidden in (draw(_FLAGS) for _ in range(draw(_NUMBERS[4])))
     ]
     variables = tuple(sorted({v.name: v for v in made}.values(), key=lambda v: v.name))
     acts = [
-        GroundAction(draw(names), args(), draw(conditions(variables)), chance(), draw(_COSTS))
-        for _ in range(draw(st.integers(0, most_actions)))
+        GroundAction(draw(names), args(), _precondition(draw, variables), chance(), draw(_COSTS))
+        for _ in range(draw(_NUMBERS[most_actions]))
     ]
     actions = tuple(sorted({a.name: a for a in acts}.values(), key=lambda a: a.name))
     templates = [
@@ -173,21 +237,21 @@ def tasks(
         for _ in range(draw(_FEW))
     ]
     initial = tuple(
-        InitialState(probability, tuple(draw(_TRUTHS[v.three_valued]) for v in variables))
+        InitialState(probability, draw(_states(tuple(v.three_valued for v in variables))))
         for probability in draw(distributions())
     )
-    signatures = [Signature(draw(st.sampled_from(_KINDS)), draw(names), args()) for _ in range(draw(_FEW))]
+    signatures = [Signature(draw(_KINDS), draw(names), args()) for _ in range(draw(_FEW))]
     return Task(
         domain=draw(names),
         problem=draw(names),
         variables=variables,
         initial=initial,
-        goal=draw(conditions(variables)),
+        goal=_goal(draw, variables, initial),
         actions=actions,
         templates=tuple(sorted({t.name: t for t in templates}.values(), key=lambda t: t.name)),
-        goal_probability=draw(st.sampled_from([Fraction(1), Fraction("0.9"), Fraction(2, 3)])),
-        goal_reward=draw(st.sampled_from([Fraction(0), Fraction(100)])),
-        metric=draw(st.sampled_from(_METRICS)),
+        goal_probability=draw(_GOALS),
+        goal_reward=draw(_REWARDS),
+        metric=draw(_METRICS),
         signatures=tuple(sorted(signatures, key=lambda s: (s.kind, s.symbol))),
     )
 

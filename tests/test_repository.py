@@ -11,9 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
+from hypothesis import settings
 
 from bbtc.backends.registry import BUILT_INS, load_exporter
 from bbtc.codes import CODES
+from tests import profiles
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SOURCES = sorted((REPOSITORY / "bbtc").rglob("*.py"))
@@ -119,6 +122,30 @@ def test_the_page_on_tests_names_every_long_form() -> None:
     assert set(re.findall(r"^\| `(tests/[\w/]+\.py)`", page, re.MULTILINE)) == sweeps
 
 
+def test_profiles_alone_decide_how_many_examples_are_drawn() -> None:
+    named = {path.name for path in (REPOSITORY / "tests").rglob("*.py") if "max_examples" in text_of(path)}
+    assert named == {"profiles.py", Path(__file__).name}
+    try:
+        settings.load_profile("explore")
+        assert profiles.examples(60).max_examples == 600
+        settings.load_profile("steady")
+        assert profiles.examples(60).max_examples == 60
+    finally:
+        profiles.load()
+
+
+def test_no_test_changes_what_is_private() -> None:
+    """Nothing whose name begins with ``_`` is set by ``setattr``, by a patch, or by assignment."""
+    called = r"\b(?:setattr|patch(?:\.\w+)?)\([^)]*[\"., ]_[a-zA-Z]\w*[\"=]"
+    private = re.compile(rf"{called}|^\s*(?!self|cls)\w+\._\w+ = ", re.MULTILINE)
+    found = {
+        path.name: private.findall(text_of(path))
+        for path in (REPOSITORY / "tests").rglob("test_*.py")
+        if path != Path(__file__)
+    }
+    assert {name: each for name, each in found.items() if each} == {}
+
+
 # --- commands --------------------------------------------------------------------------------
 
 
@@ -127,6 +154,26 @@ def test_the_readme_names_targets_that_exist() -> None:
     named = re.findall(r"^(?:\$ )?make (\w+)", "\n".join(blocks), re.MULTILINE)
     targets = re.findall(r"^([\w-]+):", text_of(REPOSITORY / "Makefile"), re.MULTILINE)
     assert {"demo", "test"} <= set(named) <= set(targets)
+
+
+def test_a_scheduled_job_makes_every_part_of_the_long_tests() -> None:
+    job = yaml.safe_load(text_of(REPOSITORY / ".github" / "workflows" / "test-long.yml"))
+    assert job[True]["schedule"], "YAML 1.1 reads `on` as true"
+    (work,) = job["jobs"].values()
+    made = re.findall(r"MAKE\) --keep-going (.*)", text_of(REPOSITORY / "Makefile"))
+    assert [" ".join(work["strategy"]["matrix"]["part"])] == made
+    assert work["steps"][-1]["run"].startswith("make ${{ matrix.part }} ")
+    page = text_of(REPOSITORY / "tests" / "README.md")
+    for part in made[0].split():
+        recipe = subprocess.run(
+            ["make", "--dry-run", "--always-make", part],
+            cwd=REPOSITORY,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        assert ".[dev,compare]" in recipe
+        assert f"| `make {part}` |" in page
 
 
 def test_links_between_documents_lead_somewhere() -> None:

@@ -89,4 +89,5 @@ def parameters_of(task: Task, symbol: Symbol) -> tuple[str, ...]:
             symbol.arity,
         ):
             return parameter_names(signature.parameters)
-    return parameter_names(["arg"] if symbol.arity == 1 else [f"arg{i}" for i in range(1, symbol.arity + 1)])
+    numbered = tuple(f"arg{i}" for i in range(1, symbol.arity + 1))
+    return parameter_names(("arg",) if symbol.arity == 1 else numbered)

@@ -16,8 +16,9 @@ from __future__ import annotations
 import hashlib
 import keyword
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from typing_extensions import assert_never
@@ -78,11 +79,12 @@ def possible_identifiers(symbol: Symbol, style: Style) -> tuple[str, ...]:
     return _candidates(symbol, style)
 
 
-def parameter_names(names: Sequence[str]) -> tuple[str, ...]:
+@lru_cache(maxsize=4096)  # a reader asks at every leaf
+def parameter_names(names: tuple[str, ...]) -> tuple[str, ...]:
     """Snake-case identifiers for the parameters of one symbol: ports and Python arguments."""
     symbols = [Symbol("parameter", name, 0) for name in names]
     if len(set(names)) < len(names):
-        return parameter_names([f"arg{position}" for position, _ in enumerate(names, 1)])
+        return parameter_names(tuple(f"arg{position}" for position, _ in enumerate(names, 1)))
     table = identifiers(symbols, "snake", {"name", "id", "robot", *_ROS_PORTS, *PYTHON_RESERVED})
     return tuple(table[symbol] for symbol in symbols)
 

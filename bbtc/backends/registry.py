@@ -46,13 +46,13 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
 
 def format_names() -> tuple[str, ...]:
     """Every format that can be asked for: built-ins in their order, then plugins by name."""
-    return tuple(dict.fromkeys([*BUILT_INS, *sorted(point.name for point in _plugins())]))
+    return tuple(dict.fromkeys([*BUILT_INS, *sorted(point.name for point in plugins())]))
 
 
 def load_exporter(name: str) -> Exporter:
     """The exporter of a format, imported now. Raises :class:`BbtcError` for an unknown format,
     for a name that two exporters claim, and for a plugin that does not load."""
-    claims = [point for point in _plugins() if point.name == name]
+    claims = [point for point in plugins() if point.name == name]
     owners = sorted({point.value for point in claims} | ({BUILT_INS[name]} if name in BUILT_INS else set()))
     if len(owners) > 1:
         raise BbtcError.single(
@@ -114,7 +114,7 @@ def _written(artefact: object) -> Artefact:
 
 def _failed(form: str, why: str) -> BbtcError:
     named = form
-    for point in _plugins():
+    for point in plugins():
         if point.name == form:
             package = f" of {point.dist.name} {point.dist.version}" if point.dist is not None else ""
             named = f"{form} ({point.value}{package})"
@@ -161,8 +161,9 @@ def _parse_value(format_name: str, option: Option, text: str) -> OptionValue:
 
 
 @cache
-def _plugins() -> tuple[EntryPoint, ...]:
-    # Looking through all that is installed takes long, and a build asks for every export.
+def plugins() -> tuple[EntryPoint, ...]:
+    """What other packages bring. It is looked up once: to look through all that is installed takes long, and
+    a build asks for every export; ``plugins.cache_clear()`` has it looked up again."""
     from importlib.metadata import entry_points
 
     return tuple(entry_points(group=GROUP))

@@ -35,8 +35,11 @@ def on_terminal(stream: TextIO | None) -> bool:
     return stream is not None and stream.isatty()
 
 
-_QUIET = 1.0  # seconds until something is shown at all
-_PAUSE = 0.1  # seconds between two looks
+QUIET = 1.0
+"""Seconds until something is shown at all."""
+
+PAUSE = 0.1
+"""Seconds between two looks."""
 
 
 @dataclass(slots=True)
@@ -58,7 +61,7 @@ class ProgressLine:
         """Show what is being done, if it takes long and some time has passed since."""
         self.bounds = stage.bounds or self.bounds
         now = time.monotonic()
-        if now - self._started >= _QUIET and now - self._shown >= _PAUSE:
+        if now - self._started >= QUIET and now - self._shown >= PAUSE:
             self._shown = now
             self.show(self._text(stage, now - self._started))
 

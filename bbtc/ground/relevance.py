@@ -23,7 +23,8 @@ from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 
-_SWEEPS = 6
+SWEEPS = 6
+"""So often the rows are gone through, at most, for what they refer to."""
 Numbers = Callable[[list[Row]], Iterable[int | None]]
 
 
@@ -147,7 +148,7 @@ class Relevance:
 
     def _close(self) -> None:
         """Sweep over the rows until nothing changes; where that takes long, follow an index instead."""
-        for _ in range(_SWEEPS):
+        for _ in range(SWEEPS):
             before = len(self.read)
             for each in self._schemas:
                 self._sweep(each)

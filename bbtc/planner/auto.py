@@ -32,7 +32,7 @@ from bbtc.rewrite.simplify import size
 MANY_ACTIONS = 500
 """A task with more gets no second opinion once a tree reaches the target."""
 
-_STATES_AND_ACTIONS = 200_000
+STATES_AND_ACTIONS = 200_000
 """For a second opinion, states times actions of the task are explored up to this number."""
 
 LARGE_TREE = 100
@@ -97,7 +97,7 @@ def _policy(task: Task, target: Fraction, limits: Limits, options: Options, know
         return plan_policy(task, target, limits, _silent, options)
     if size(known.tree.root) == 1 or len(task.actions) > MANY_ACTIONS:
         return None
-    work = _WORK_FOR_LARGE if size(known.tree.root) > LARGE_TREE else _STATES_AND_ACTIONS
+    work = _WORK_FOR_LARGE if size(known.tree.root) > LARGE_TREE else STATES_AND_ACTIONS
     few = max(1, min(limits.states, work // max(1, len(task.actions))))
     try:
         found = plan_policy(task, target, replace(limits, states=few), _silent, options, whole=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from jsonschema import Draft202012Validator
 
 from bbtc.artefacts import (
@@ -136,21 +136,18 @@ def test_an_effect_that_contradicts_itself_is_written_as_what_it_does() -> None:
 # --- round trips -----------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(tasks(nested=2))
 def test_a_task_survives_the_round_trip(task: Task) -> None:
     text = dumps(task_to_json(task))
     assert load_task(SourceFile("task.json", text)) == task
 
 
-@settings(deadline=None)
 @given(tasks(HOSTILE_NAMES, nested=0))
 def test_a_task_with_hostile_names_survives_the_round_trip(task: Task) -> None:
     text = dumps(task_to_json(task))
     assert load_task(SourceFile("task.json", text)) == task
 
 
-@settings(deadline=None)
 @given(trees())
 def test_a_tree_survives_the_round_trip(tree: Tree) -> None:
     text = dumps(tree_to_json(tree))
@@ -162,7 +159,6 @@ def test_a_tree_survives_the_round_trip(tree: Tree) -> None:
     assert load_tree(SourceFile("tree.json", text), tree.task) == tree
 
 
-@settings(deadline=None)
 @given(trees(HOSTILE_NAMES))
 def test_artefacts_match_their_schemas(tree: Tree) -> None:
     TASK_SCHEMA.validate(as_json(task_to_json(tree.task)))

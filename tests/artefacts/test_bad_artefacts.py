@@ -7,12 +7,13 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.artefacts import dumps, load_task, load_tree, task_to_json, tree_from_json, tree_to_json
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.source import SourceFile
+from tests.profiles import examples
 from tests.strategies import soda_task, soda_tree
 
 Edit = Callable[[Any], object]
@@ -331,7 +332,7 @@ def damaged(draw: st.DrawFn, value: Any) -> Any:
         return value
 
 
-@settings(deadline=None, max_examples=300)
+@examples(300)
 @given(st.data())
 def test_a_damaged_artefact_is_read_or_refused_with_places(data: st.DataObject) -> None:
     kinds: list[tuple[Any, Callable[[SourceFile], object]]] = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
@@ -13,6 +13,7 @@ from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.limits import Limits
 from bbtc.tree.nodes import Tree
+from tests.profiles import examples
 from tests.strategies import soda_tree, trees
 
 
@@ -25,7 +26,7 @@ def finish(stepper: Stepper) -> None:
         stepper.step()
 
 
-@settings(max_examples=150)
+@examples(150)
 @given(trees())
 def test_taking_the_outcomes_of_a_scenario_gives_that_scenario(tree: Tree) -> None:
     try:

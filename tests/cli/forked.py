@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import io
 import json
 import os
 import resource
+import selectors
 import signal
 import struct
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[2]
-LONGEST = 60  # seconds of a run; then it counts as hanging
+LONGEST = 300  # seconds of a run; then it counts as hanging
 _WORDS = "coin.pddl -q --target 0.75 -o tree.json"
 _WARM_UP = (
     f"plan {_WORDS} --depfile tree.d",
@@ -41,11 +42,22 @@ _WARM_UP = (
 
 @dataclass(frozen=True)
 class Done:
-    """How a run ended; a negative status is a signal."""
+    """How a run ended; a negative status is a signal. ``seconds`` are of processor time."""
 
     status: int
-    out: str
-    err: str
+    stdout: bytes
+    stderr: bytes
+    seconds: float
+
+    @property
+    def out(self) -> str:
+        """What it printed."""
+        return self.stdout.decode(errors="replace")
+
+    @property
+    def err(self) -> str:
+        """What it told."""
+        return self.stderr.decode(errors="replace")
 
 
 class Commands:
@@ -55,29 +67,38 @@ class Commands:
         self._process = process
 
     def run(
-        self, folder: Path, *arguments: str, most_bytes: int | None = None, powerless: bool = False
+        self,
+        folder: Path,
+        *arguments: str,
+        stdin: bytes = b"",
+        most_bytes: int | None = None,
+        most_memory: int | None = None,
+        powerless: bool = False,
     ) -> Done:
         """Run the program in a folder; ``most_bytes``: no file can be larger, as if the disk were full;
-        ``powerless``: without what lets root write everywhere."""
+        ``most_memory``: so many bytes of address space; ``powerless``: without what lets root write
+        everywhere."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps([str(folder), arguments, most_bytes, powerless]) + "\n")
+        wanted = [str(folder), arguments, stdin.decode("latin-1"), most_bytes, most_memory, powerless]
+        self._process.stdin.write(json.dumps(wanted) + "\n")
         self._process.stdin.flush()
-        return Done(*json.loads(self._process.stdout.readline()))
+        status, seconds, out, err = json.loads(self._process.stdout.readline())
+        return Done(status, out.encode("latin-1"), err.encode("latin-1"), seconds)
 
 
-@contextmanager
-def commands() -> Iterator[Commands]:
-    """The process, as long as it is wanted."""
-    with subprocess.Popen(
+@cache
+def commands() -> Commands:
+    """The process, which ends with this one."""
+    process = subprocess.Popen(
         [sys.executable, __file__],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY), "NO_COLOR": "1"},
-    ) as process:
-        yield Commands(process)
-        process.kill()
+    )
+    atexit.register(process.communicate)
+    return Commands(process)
 
 
 # --- in the process --------------------------------------------------------------------------
@@ -88,20 +109,40 @@ def _main() -> None:
     os.dup2(2, 1)
     _warm_up()
     for line in sys.stdin:
-        pipes = [os.pipe(), os.pipe()]
-        child = os.fork()
-        if not child:
-            for number, (_, into) in enumerate(pipes, 1):
-                os.dup2(into, number)
-            _child(*json.loads(line))
-        status = os.waitpid(child, 0)[1]
-        told = []
-        for out_of, into in pipes:  # which have room for all that is printed
+        folder, arguments, stdin, *bounds = json.loads(line)
+        with tempfile.TemporaryFile() as given:
+            given.write(stdin.encode("latin-1"))
+            given.seek(0)
+            pipes = [os.pipe(), os.pipe()]
+            child = os.fork()
+            if not child:
+                os.dup2(given.fileno(), 0)
+                for number, (_, into) in enumerate(pipes, 1):
+                    os.dup2(into, number)
+                _child(folder, arguments, *bounds)
+        for _, into in pipes:
             os.close(into)
-            with os.fdopen(out_of, "rb") as stream:
-                told.append(stream.read().decode(errors="replace"))
-        answers.write(json.dumps([os.waitstatus_to_exitcode(status), *told]) + "\n")
+        told = _read([out_of for out_of, _ in pipes])
+        _, status, used = os.wait4(child, 0)
+        seconds = used.ru_utime + used.ru_stime
+        answers.write(json.dumps([os.waitstatus_to_exitcode(status), seconds, *told]) + "\n")
         answers.flush()
+
+
+def _read(pipes: list[int]) -> list[str]:
+    """What is written to pipes until their ends, a character for each byte."""
+    told = {pipe: bytearray() for pipe in pipes}
+    with selectors.DefaultSelector() as waiting:
+        for pipe in pipes:
+            waiting.register(pipe, selectors.EVENT_READ)
+        while waiting.get_map():
+            for key, _ in waiting.select():
+                piece = os.read(key.fd, 1 << 16)
+                told[key.fd] += piece
+                if not piece:
+                    waiting.unregister(key.fd)
+                    os.close(key.fd)
+    return [data.decode("latin-1") for data in told.values()]
 
 
 def _warm_up() -> None:
@@ -127,13 +168,17 @@ def _run(arguments: list[str]) -> int:
     return run()
 
 
-def _child(folder: str, arguments: list[str], most_bytes: int | None, powerless: bool) -> None:
+def _child(
+    folder: str, arguments: list[str], most_bytes: int | None, most_memory: int | None, powerless: bool
+) -> None:
     signal.alarm(LONGEST)
+    sys.stdin = io.TextIOWrapper(os.fdopen(0, "rb", closefd=False))
     sys.stdout = io.TextIOWrapper(os.fdopen(1, "wb", closefd=False))
     sys.stderr = io.TextIOWrapper(os.fdopen(2, "wb", closefd=False), line_buffering=True)
     os.chdir(folder)
-    if most_bytes is not None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+    for what, most in ((resource.RLIMIT_FSIZE, most_bytes), (resource.RLIMIT_AS, most_memory)):
+        if most is not None:
+            resource.setrlimit(what, (most, resource.getrlimit(what)[1]))
     if powerless:
         _give_up_capabilities()
     from bbtc.cli.main import main

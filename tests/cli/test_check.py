@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.cli import program
 
 DOMAIN = """(define (domain d)
   (:predicates (a) (b) (c) (unused))
@@ -21,14 +21,7 @@ FOR_B = "(define (problem pb) (:domain d) (:goal (b)))\n"
 
 def bbtc(*arguments: str, folder: Path) -> tuple[int, str]:
     """Exit status and messages."""
-    done = subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    done = program.bbtc(*arguments, folder=folder)
     return done.returncode, done.stderr
 
 

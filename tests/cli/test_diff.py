@@ -5,19 +5,19 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.cli.program import bbtc
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 SODA = GOLDEN / "household" / "look-for-soda" / "tree.json"
 
 
 def diff(old: Path, new: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "bbtc.cli.main", "diff", str(old), str(new), *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return bbtc("diff", old, new, *arguments)
 
 
 @pytest.fixture

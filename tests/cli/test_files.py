@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,9 +18,8 @@ MANIFEST = "trees: {c: {domain: coin.pddl, target: 0.5, exports: [dot]}}\n"
 
 
 @pytest.fixture(scope="module")
-def program() -> Iterator[Commands]:
-    with commands() as running:
-        yield running
+def program() -> Commands:
+    return commands()
 
 
 @pytest.fixture

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.cli.program import bbtc
 
 ROUGH = """; a comment before
 (define (domain d) ; and one behind
@@ -14,19 +14,6 @@ ROUGH = """; a comment before
    go :parameters (?X) ; the parameter
    :effect (B ?X)))
 """
-
-
-def bbtc(*arguments: str, folder: Path, stdin: str = "") -> subprocess.CompletedProcess[str]:
-    """Run the command in a folder."""
-    return subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", *arguments],
-        cwd=folder,
-        input=stdin,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
 
 
 @pytest.fixture

@@ -3,37 +3,25 @@
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
 
+from tests.cli.forked import commands
 from tests.conftest import REPOSITORY
 
 _MEMORY = 6 << 30  # bytes of address space; more than that ends the process
 _SECONDS = 60.0  # processor time
 
-_ENOUGH = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({_MEMORY}, {_MEMORY}))\n"
-_MAIN = f"{_ENOUGH}from bbtc.cli.main import main; main()"
-
 
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the program; fails if it takes too much processor time."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    started = time.monotonic()
-    done = subprocess.run(
-        [sys.executable, "-c", _MAIN, *arguments],
-        capture_output=True, text=True, check=False, timeout=600, cwd=REPOSITORY,
-    )  # fmt: skip
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    assert used < _SECONDS, f"{used:.1f} s of processor time, {time.monotonic() - started:.1f} s in all"
-    assert "Traceback" not in done.stderr
-    assert "internal error" not in done.stderr
-    return done
+    done = commands().run(REPOSITORY, *arguments, most_memory=_MEMORY)
+    assert done.seconds < _SECONDS, f"{done.seconds:.1f} s of processor time"
+    assert "Traceback" not in done.err
+    assert "internal error" not in done.err
+    return subprocess.CompletedProcess(arguments, done.status, done.out, done.err)
 
 
 def _wide(path: Path, parameters: int, objects: int, condition: str) -> Path:

@@ -6,7 +6,6 @@ import hashlib
 import json
 import re
 import subprocess
-import sys
 from functools import cache
 from importlib.metadata import distribution
 from importlib.util import find_spec
@@ -20,6 +19,7 @@ from bbtc.cli.group import COMMANDS
 from bbtc.cli.rendering import render
 from bbtc.diagnostics import Diagnostic, Related, Severity
 from bbtc.source import SourceFile, Span
+from tests.cli.program import bbtc
 
 REPOSITORY = Path(__file__).parents[2]
 PUBLISHED = "c3b4bb2d6093897483348925aaa73af03b3e3f4bd4ca38cef26dcb4212a2682e"
@@ -72,15 +72,7 @@ def assert_sarif(text: str) -> list[dict[str, Any]]:
 
 def command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run a command."""
-    return subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-        stdin=subprocess.DEVNULL,
-    )
+    return bbtc(*arguments, folder=folder)
 
 
 @pytest.fixture

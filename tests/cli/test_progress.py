@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminal
 
 # The program, with progress shown from the start and at every look.
 _EAGER = (
-    "import bbtc.cli.output as output; output._QUIET = output._PAUSE = 0.0\n"
+    "import bbtc.cli.output as output; output.QUIET = output.PAUSE = 0.0\n"
     "from bbtc.cli.main import main; main()"
 )
 
@@ -119,7 +119,7 @@ def test_a_short_run_shows_nothing(
     line = ProgressLine()
     line.watch(Stage("exploration", 256))
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(output, "_QUIET", 0.0)
+    monkeypatch.setattr(output, "QUIET", 0.0)
     line.watch(Stage("exploration", 12_345, (0.25, 1.0)))
     line.watch(Stage("exploration", 12_346))
     assert capsys.readouterr().err == "\rexploration, 12,345 states, best probability between 0.25 and 1, 0 s"

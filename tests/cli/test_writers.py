@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import stat
 import sys
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -128,9 +127,8 @@ WRITERS = {
 
 
 @pytest.fixture(scope="module")
-def program() -> Iterator[Commands]:
-    with commands() as running:
-        yield running
+def program() -> Commands:
+    return commands()
 
 
 @pytest.fixture(scope="module")

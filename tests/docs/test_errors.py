@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ from bbtc.diagnostics import BbtcError, Diagnostic, Report
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 from bbtc.syntax.parser import parse
+from tests.cli.program import bbtc
 
 REPOSITORY = Path(__file__).parents[2]
 PAGES = REPOSITORY / "docs" / "errors"
@@ -101,14 +101,7 @@ def test_the_right_example_gives_nothing(code: str) -> None:
 
 def explain(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Run ``bbtc explain``."""
-    return subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", "explain", *arguments],
-        cwd=REPOSITORY,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    return bbtc("explain", *arguments)
 
 
 @pytest.mark.parametrize("spelling", ["BBT0202", "bbt0202", "0202", "202"])

@@ -5,10 +5,11 @@ from __future__ import annotations
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.cli.program import bbtc
 
 REPOSITORY = Path(__file__).parents[2]
 PAGE = REPOSITORY / "docs" / "pictures.md"
@@ -28,10 +29,7 @@ def test_the_pictures_are_up_to_date(tmp_path: Path) -> None:
     drawn = set()
     for _, name, *arguments in commands:
         check = ["--check"] if name == "export" else []
-        command = [sys.executable, "-m", "bbtc.cli.main", name, *arguments, *check]
-        done = subprocess.run(
-            command, cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=120
-        )
+        done = bbtc(name, *arguments, *check)
         assert done.returncode == 0, done.stderr
         drawn |= {argument for argument in arguments if argument.startswith("docs/pictures/")}
     kept = {str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / "docs" / "pictures").iterdir()}

@@ -7,11 +7,10 @@ import random
 import re
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 import bbtc
 from bbtc.backends.btcpp.names import RESERVED
@@ -25,7 +24,9 @@ from bbtc.replay.engines import BtcppReplay, PyTreesReplay
 from bbtc.replay.script import TIMINGS, Run, Script
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
+from tests import btcpp_nodes
 from tests.conftest import Golden
+from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import STATUS, random_run, value_of, varied_runs
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
@@ -240,9 +241,8 @@ def test_the_model_can_be_left_out() -> None:
     assert "TreeNodesModel" not in export(soda_tree(), model="no")
 
 
-def test_stock_nodes_are_those_of_the_engine(shared: Path) -> None:
-    stock = ET.parse(shared / "backends" / "btcpp-builtin-nodes-4.10.0.xml")
-    assert {node.attrib["ID"] for node in stock.getroot()[0]} <= RESERVED
+def test_stock_nodes_are_those_of_the_engine() -> None:
+    assert set(btcpp_nodes.NODES) <= RESERVED
 
 
 @pytest.mark.parametrize("seed", range(60))
@@ -254,7 +254,7 @@ def test_random_trees_keep_the_rules_of_the_engine(seed: int) -> None:
     assert export(tree) == text
 
 
-@settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
+@examples(60)
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_neither_break_the_file_nor_change_what_it_does(tree: Tree) -> None:
     pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")

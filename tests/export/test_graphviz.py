@@ -16,7 +16,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.backends.pictures.diagram import diagram, flow_text, wrap
@@ -27,6 +27,7 @@ from bbtc.ground.condition import Is
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 from tests.conftest import Golden
+from tests.profiles import examples
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 _SVG = "{http://www.w3.org/2000/svg}"
@@ -193,7 +194,7 @@ def test_long_texts_are_broken_and_cut() -> None:
 # --- any names -------------------------------------------------------------------------------
 
 
-@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.too_slow])
+@examples(40)
 @given(trees(HOSTILE_NAMES), st.booleans())
 def test_graphviz_reads_back_every_text_whatever_the_names(tree: Tree, expand: bool) -> None:
     items = diagram(tree, None, expand=expand)
@@ -215,7 +216,6 @@ def test_graphviz_takes_a_name_for_what_it_is(name: str) -> None:
     assert nodes["n1"].lines == [name]
 
 
-@settings(deadline=None)
 @given(trees(HOSTILE_NAMES))
 def test_our_svg_is_well_formed_whatever_the_names(tree: Tree) -> None:
     text = str(export(tree, "svg", {"layout": "bbtc", "legend": "true"}))

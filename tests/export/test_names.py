@@ -82,7 +82,7 @@ def test_an_identifier_does_not_depend_on_names_it_does_not_collide_with(names: 
 
 @given(st.lists(HOSTILE_NAMES, max_size=4))
 def test_parameters_of_a_leaf_are_distinct_and_never_reserved_by_an_engine(names: list[str]) -> None:
-    made = parameter_names(names)
+    made = parameter_names(tuple(names))
     assert len(made) == len(names) == len(set(made))
     for name in made:
         assert re.fullmatch(r"[a-z][a-z0-9_]*", name)
@@ -91,9 +91,9 @@ def test_parameters_of_a_leaf_are_distinct_and_never_reserved_by_an_engine(names
 
 
 def test_parameters_keep_their_names() -> None:
-    assert parameter_names(["object", "from-room"]) == ("object", "from_room")
-    assert parameter_names(["name", "class"]) == ("arg_name", "arg_class")
-    assert parameter_names(["x", "x"]) == ("arg1", "arg2")
+    assert parameter_names(("object", "from-room")) == ("object", "from_room")
+    assert parameter_names(("name", "class")) == ("arg_name", "arg_class")
+    assert parameter_names(("x", "x")) == ("arg1", "arg2")
 
 
 @given(st.sets(HOSTILE_NAMES, max_size=8))

@@ -14,7 +14,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.backends.pytrees.exporter import py_trees_names
 from bbtc.backends.pytrees.pycode import call, layout, literal
@@ -30,6 +30,7 @@ from bbtc.replay.script import Run, Script
 from bbtc.tree.nodes import Tree, actions_of
 from tests.conftest import Golden
 from tests.export.test_btcpp import nested
+from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import random_run
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
@@ -149,7 +150,7 @@ def test_modules_import_py_trees_the_standard_library_and_only_on_demand_bbtc(wr
         assert modules - ours - sys.stdlib_module_names <= allowed
 
 
-@settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
+@examples(60)
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_neither_become_code_nor_change_what_it_does(tree: Tree) -> None:
     source = export(tree)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
@@ -39,10 +40,22 @@ plain = Plain()
 not_an_exporter = 7
 
 
-def install(monkeypatch: pytest.MonkeyPatch, **plugins: str) -> None:
-    """Make entry points of the group visible, by name and value."""
-    points = tuple(EntryPoint(name, value, registry.GROUP) for name, value in plugins.items())
-    monkeypatch.setattr(registry, "_plugins", lambda: points)
+@pytest.fixture
+def install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[..., None]]:
+    """Install a package with such entry points of the group, by name and value."""
+
+    def installed(**plugins: str) -> None:
+        info = tmp_path / "strange-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: strange\nVersion: 1.0\n")
+        points = "".join(f"{name} = {value}\n" for name, value in plugins.items())
+        (info / "entry_points.txt").write_text(f"[{registry.GROUP}]\n{points}")
+        monkeypatch.syspath_prepend(tmp_path)
+        registry.plugins.cache_clear()
+
+    yield installed
+    monkeypatch.undo()
+    registry.plugins.cache_clear()
 
 
 def code_of(error: pytest.ExceptionInfo[BbtcError]) -> str:
@@ -68,15 +81,17 @@ def test_an_unknown_format_is_an_error_with_the_nearest_name() -> None:
     assert error.value.diagnostics[0].hint == "did you mean 'btcpp'?"
 
 
-def test_a_plugin_is_a_format_like_any_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, plain=f"{__name__}:plain")
+def test_a_plugin_is_a_format_like_any_other(
+    monkeypatch: pytest.MonkeyPatch, install: Callable[..., None]
+) -> None:
+    install(plain=f"{__name__}:plain")
     monkeypatch.setattr(EntryPoint, "load", lambda self: plain)
     assert format_names()[-1] == "plain"
     assert load_exporter("plain") is plain
 
 
-def test_a_plugin_with_the_name_of_a_built_in_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, dot="elsewhere:dot")
+def test_a_plugin_with_the_name_of_a_built_in_is_an_error(install: Callable[..., None]) -> None:
+    install(dot="elsewhere:dot")
     with pytest.raises(BbtcError) as error:
         load_exporter("dot")
     assert code_of(error) == "BBT0702"
@@ -85,15 +100,17 @@ def test_a_plugin_with_the_name_of_a_built_in_is_an_error(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("value", ["no.such.module:x", "bbtc.backends.registry:no_such_object"])
-def test_a_plugin_that_does_not_load_is_an_error(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
-    install(monkeypatch, mine=value)
+def test_a_plugin_that_does_not_load_is_an_error(install: Callable[..., None], value: str) -> None:
+    install(mine=value)
     with pytest.raises(BbtcError) as error:
         load_exporter("mine")
     assert code_of(error) == "BBT0703"
 
 
-def test_a_plugin_that_is_no_exporter_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, mine=f"{__name__}:not_an_exporter")
+def test_a_plugin_that_is_no_exporter_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, install: Callable[..., None]
+) -> None:
+    install(mine=f"{__name__}:not_an_exporter")
     monkeypatch.setattr(EntryPoint, "load", lambda self: not_an_exporter)
     with pytest.raises(BbtcError) as error:
         load_exporter("mine")
@@ -122,9 +139,9 @@ class Failing:
     ids=repr,
 )  # fmt: skip
 def test_a_plugin_that_fails_is_told_as_its_own_fault(
-    monkeypatch: pytest.MonkeyPatch, artefact: object
+    monkeypatch: pytest.MonkeyPatch, install: Callable[..., None], artefact: object
 ) -> None:
-    install(monkeypatch, failing="strange.package:exporter")
+    install(failing="strange.package:exporter")
     monkeypatch.setattr(EntryPoint, "load", lambda self: Failing(artefact))
     domain, problem = (DOMAINS / "household" / f"{name}.pddl" for name in ("domain", "look-for-soda"))
     tree = bbtc.plan(domain, problem, target="0.5").tree

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 
 from bbtc.artefacts import load_tree, tree_to_json
 from bbtc.backends.pictures.diagram import diagram
@@ -24,6 +24,7 @@ from bbtc.kleene import Truth
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 from tests.long_form import amount
+from tests.profiles import examples
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 
@@ -165,7 +166,7 @@ def test_mermaid_can_stand_in_a_code_block() -> None:
 # --- json and yaml ---------------------------------------------------------------------------
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(trees(HOSTILE_NAMES))
 def test_json_is_the_artefact_and_yaml_holds_the_same(tree: Tree) -> None:
     text = export(tree, "json")

@@ -8,7 +8,7 @@ from fractions import Fraction
 from math import prod
 from unittest.mock import patch
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import BbtcError, Report
@@ -24,21 +24,20 @@ from bbtc.model.domain import Model
 from tests.ground import reference
 from tests.ground.examples import model_of
 from tests.ground.lifted_texts import lifted_texts
+from tests.profiles import examples
 
 Change = frozenset[tuple[int, Truth]]
 _MOST_COMBINATIONS = 500
-_SETTINGS = settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large]
-)
+_SETTINGS = examples(60)
 
 
 _BOUNDS = {
-    (program, "_FEW"): st.integers(0, 3),
-    (program, "_MOST_ALTERNATIVES"): st.integers(1, 4),
-    (program, "_FIRST_CHAIN"): st.integers(0, 3),
+    (program, "FEW_BINDINGS"): st.integers(0, 3),
+    (program, "MOST_ALTERNATIVES"): st.integers(1, 4),
+    (program, "FIRST_CHAIN"): st.integers(0, 3),
     (bulk, "CHUNK"): st.integers(1, 3),
-    (bulk, "_MOST_SHARED"): st.integers(0, 3),
-    (relevance, "_SWEEPS"): st.integers(0, 2),
+    (bulk, "MOST_SHARED"): st.integers(0, 3),
+    (relevance, "SWEEPS"): st.integers(0, 2),
 }
 
 

@@ -17,6 +17,7 @@ from bbtc.source import SourceFile
 from bbtc.syntax.parser import parse
 from tests.conftest import corpus_folder
 from tests.ground import reference
+from tests.plan.examples import published
 
 CORPUS = corpus_folder()
 pytestmark = pytest.mark.skipif(CORPUS is None, reason="no corpus beside the repository")
@@ -44,10 +45,9 @@ def _optima() -> Iterator[tuple[str, str]]:
     if CORPUS is None:
         return
     seen: dict[str, int] = {}
-    for line in Path(CORPUS, "optima.tsv").read_text("utf-8").splitlines():
-        domain, problem = line.split("\t")[:2] if not line.startswith("#") else ("", "")
+    for domain, problem, *_ in published():
         folder = problem.rpartition("/")[0]
-        if folder and seen.setdefault(folder, 0) < _PER_FOLDER:
+        if (CORPUS / problem).is_file() and seen.setdefault(folder, 0) < _PER_FOLDER:
             seen[folder] += 1
             yield domain, problem
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.artefacts import dumps, load_tree, tree_to_json
 from bbtc.backends.btcpp.exporter import btcpp
@@ -25,6 +25,7 @@ from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.export.test_btcpp import nested
 from tests.imports.labels import labelled
 from tests.long_form import amount
+from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
@@ -149,7 +150,7 @@ def test_without_notes_all_but_ids_and_claims_comes_back() -> None:
             assert ids == [f"n{number + 1}" for number in range(len(ids))]
 
 
-@settings(deadline=None, max_examples=150, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_and_labels_come_back(tree: Tree) -> None:
     if not is_sound(tree):

@@ -1,8 +1,9 @@
-"""The shared examples with their optima, and small tasks written by hand."""
+"""Examples with their optima: small domains of our own, and problems of the corpus."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources
 from bbtc.syntax.reader import read_source
-from tests.conftest import corpus_folder, shared_folder
+from tests.conftest import corpus_folder
 
 BUDGETS = (1, 2, 3, 4, 6, 8, 12)
 
@@ -32,37 +33,46 @@ class Optimum:
 
     def task(self) -> Task:
         """The ground task. Raises ``BbtcError`` where it cannot be loaded."""
-        return compile_sources([read_source(str(file)) for file in self.files], Report(), Limits(seconds=60))
+        return _task(self.files)
+
+
+@cache
+def _task(files: tuple[Path, ...]) -> Task:
+    return compile_sources([read_source(str(file)) for file in files], Report(), Limits(seconds=60))
 
 
 def cases() -> list[Optimum]:
     """The small domains on which greedy expansion fails or is poor."""
-    folder = shared_folder()
-    if folder is None or not (folder / "cases").is_dir():
-        return []
+    folder = Path(__file__).parent / "cases"
     found = []
-    for line in (folder / "cases" / "optima.tsv").read_text(encoding="utf-8").splitlines():
-        if line.startswith("#"):
-            continue
-        name, best, *within = line.split("\t")
+    for name, best, *within in _rows(folder / "optima.tsv"):
         budgets = tuple((int(k[1:]), float(p)) for k, p in (item.split("=") for item in within))
-        found.append(Optimum((folder / "cases" / f"{name}.pddl",), float(best), budgets))
+        found.append(Optimum((folder / f"{name}.pddl",), float(best), budgets))
     return found
+
+
+def published() -> list[tuple[str, str, float, list[float]]]:
+    """What others computed for public problems: domain and problem, as the corpus names them, P*, and the
+    best with 2, 4, 8 and 16 actions."""
+    return [
+        (domain, problem, float(best), [float(each) for each in within.split(",")])
+        for domain, problem, best, within in _rows(Path(__file__).parent / "published_optima.tsv")
+    ]
 
 
 def corpus_optima() -> list[Optimum]:
-    """Public problems with their optima, computed by others' means."""
+    """The public problems of the corpus whose optima are known; none where it is absent."""
     folder = corpus_folder()
-    if folder is None or not (folder / "optima.tsv").is_file():
-        return []
-    found = []
-    for line in (folder / "optima.tsv").read_text(encoding="utf-8").splitlines():
-        if line.startswith("#"):
-            continue
-        domain, problem, best, _, within, *_ = line.split("\t")
-        budgets = tuple(zip((2, 4, 8, 16), map(float, within.split(",")), strict=True))
-        found.append(Optimum((folder / domain, folder / problem), float(best), budgets))
-    return found
+    return [
+        Optimum((folder / domain, folder / problem), best, tuple(zip((2, 4, 8, 16), within, strict=True)))
+        for domain, problem, best, within in published()
+        if folder is not None and (folder / problem).is_file()
+    ]
+
+
+def _rows(file: Path) -> list[list[str]]:
+    lines = file.read_text(encoding="utf-8").splitlines()
+    return [line.split("\t") for line in lines if not line.startswith("#")]
 
 
 def public(folder: str, problem: str) -> Optimum:

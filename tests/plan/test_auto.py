@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
@@ -17,6 +17,7 @@ from bbtc.planner.strategies import DEFAULT
 from bbtc.tree.nodes import walk
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -35,7 +36,7 @@ def size(of: Plan) -> int:
     return sum(1 for _ in walk(of.tree.root))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(60)
 @given(of=tasks())
 def test_auto_is_no_worse_than_the_other_strategies(of: Task) -> None:
     auto = plan(of, "auto", "0.9")
@@ -88,8 +89,7 @@ def test_a_large_tree_is_worth_a_longer_second_opinion(monkeypatch: pytest.Monke
     (of,) = (task_of(p) for p in PROBLEMS if str(p) == "warehouse/blocked-aisle")
     found, small = size(plan(of, "search")), size(plan(of, "policy"))
     assert small < found
-    monkeypatch.setattr("bbtc.planner.auto._STATES_AND_ACTIONS", 1)
-    monkeypatch.setattr("bbtc.planner.auto._refine", lambda *_: None)
+    monkeypatch.setattr("bbtc.planner.auto.STATES_AND_ACTIONS", 1)
     monkeypatch.setattr("bbtc.planner.auto.LARGE_TREE", found)
     assert size(plan(of, "auto")) == found
     monkeypatch.setattr("bbtc.planner.auto.LARGE_TREE", found - 1)

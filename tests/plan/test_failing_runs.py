@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.scenarios import scenarios
@@ -25,6 +25,7 @@ from bbtc.planner.why_not import Block, RootFinder
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
 from tests.domains.problems import bbtc
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.strategies import trees
 
 T, F = Truth.TRUE, Truth.FALSE
@@ -201,7 +202,7 @@ def _all_runs(chain: Chain, most: int) -> Iterator[tuple[Fraction, int]]:
         todo.extend((probability * p, after) for after, p in successors.items())
 
 
-@settings(deadline=None, max_examples=80, suppress_health_check=[HealthCheck.too_slow])
+@examples(80)
 @given(trees())
 def test_the_failing_runs_are_those_of_the_plain_enumeration(tree: Tree) -> None:
     chain = explore(tree.task, tree.root, Limits())
@@ -218,7 +219,7 @@ def test_the_failing_runs_are_those_of_the_plain_enumeration(tree: Tree) -> None
     assert sum((run.probability for run in listed), Fraction(0)) == found.failure + found.blocked
 
 
-@settings(deadline=None, max_examples=80, suppress_health_check=[HealthCheck.too_slow])
+@examples(80)
 @given(trees())
 def test_with_what_it_lacks_given_the_goal_is_in_reach_again(tree: Tree) -> None:
     """Of whatever state: where parts of the goal are lost, setting the facts named takes that back."""

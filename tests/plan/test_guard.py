@@ -7,7 +7,7 @@ from fractions import Fraction
 from itertools import product
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.simulate import simulate
@@ -26,6 +26,7 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree, action
 from bbtc.verifier.verdict import verify
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.long_form import amount
+from tests.profiles import examples
 from tests.strategies import tasks
 
 
@@ -52,7 +53,7 @@ def test_guarded_trees_of_our_domains_succeed_as_often_at_the_same_cost(problem:
     assert verify(tree, Limits(), "own").problems == ()
 
 
-@settings(max_examples=amount(60, 2000), deadline=None, suppress_health_check=list(HealthCheck))
+@examples(amount(60, 2000))
 @given(task=tasks(), strategy=st.sampled_from(list(STRATEGIES)))
 def test_guards_cost_no_success(task: Task, strategy: str) -> None:
     limits = Limits(seconds=20, states=20_000, nodes=200)

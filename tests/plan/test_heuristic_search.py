@@ -6,13 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.planner.mdp import bounded_search as heuristic_search
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.h_add import Facts, Relaxation, operators_of
@@ -21,51 +20,45 @@ from bbtc.planner.mdp.solve import best_known
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases, public
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
-MANY = amount(100, 5000)
+MANY = examples(amount(100, 5000))
 """Random tasks of one kind."""
 
 
-@pytest.fixture
-def small_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step of the search expands few states, so that parts of small spaces remain open."""
-    monkeypatch.setattr(heuristic_search, "_SMALLEST", 2)
+SMALL = 2
+"""States that a step of the search expands, so that parts of small spaces remain open."""
 
 
-@pytest.mark.usefixtures("small_steps")
-@settings(
-    max_examples=MANY,
-    suppress_health_check=[*HealthCheck],
-)
+@MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> None:
     known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
-    found = search_bounds(of, Limits())
+    found = search_bounds(of, Limits(), step=SMALL)
     assert found.stop is None
     assert found.bounds.lower <= known <= found.bounds.upper
     assert found.bounds.upper - found.bounds.lower <= 1e-9
     assert found.lower.initial.lower == found.bounds.lower, "the policy attains the lower bound"
 
 
-@pytest.mark.usefixtures("small_steps")
-@settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
+@MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
     known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
     for states in (1, 3, 6):
-        found = search_bounds(of, Limits(states=states))
+        found = search_bounds(of, Limits(states=states), step=SMALL)
         assert found.bounds.lower <= known <= found.bounds.upper
     target = Fraction(1, 2)
-    told = search_bounds(of, Limits(), target).bounds
+    told = search_bounds(of, Limits(), target, step=SMALL).bounds
     assert told.lower <= known <= told.upper
     assert (told.lower >= target) == (known >= target) or told.upper - told.lower < 1e-9
 
 
-@settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
+@MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_what_the_heuristic_calls_a_dead_end_is_one(of: Task) -> None:
     space = explore_space(of, Limits())
@@ -75,7 +68,7 @@ def test_what_the_heuristic_calls_a_dead_end_is_one(of: Task) -> None:
     assert ((guess == 0) | ~space.goal).all()
 
 
-@settings(max_examples=MANY, suppress_health_check=[*HealthCheck])
+@MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_guess_for_many_states_at_a_time_is_that_for_each(of: Task) -> None:
     """By the equations of the additive heuristic, one state and one operator at a time."""
@@ -102,12 +95,12 @@ def test_the_guess_for_many_states_at_a_time_is_that_for_each(of: Task) -> None:
         assert np.isinf(weighed.costs[: len(costs)]).tolist() == np.isinf(costs).tolist()
 
 
-def test_a_loop_that_can_be_left_only_with_a_loss_is_not_worth_more_than_its_exit(small_steps: None) -> None:
+def test_a_loop_that_can_be_left_only_with_a_loss_is_not_worth_more_than_its_exit() -> None:
     """Two rooms one can go round in for ever: an end component, in which optimism would stay."""
     there, back = action("there", Is(0, F), ("1", {0: T})), action("back", Is(0, T), ("1", {0: F}))
     risk = action("risk", Is(2, F), ("1/3", {1: T, 2: T}), ("2/3", {2: T}))
     of = task("room won over", {}, Is(1, T), there, back, risk)
-    assert search_bounds(of, Limits()).bounds.exact == Fraction(1, 3)
+    assert search_bounds(of, Limits(), step=SMALL).bounds.exact == Fraction(1, 3)
 
 
 def test_a_goal_that_nothing_reaches_takes_no_expansion() -> None:

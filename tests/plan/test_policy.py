@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
@@ -36,6 +36,7 @@ from bbtc.tree.nodes import ActionNode, ControlNode, Node, retries_of, walk
 from bbtc.tree.validate import check_tree
 from tests.plan.examples import Optimum, cases, corpus_optima
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -77,7 +78,7 @@ def test_public_problems_are_solved_at_their_best(problem: Optimum) -> None:
     assert size(done) < 150
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(300)
 @given(of=tasks())
 def test_random_tasks_are_solved_at_their_best_and_least_cost(of: Task) -> None:
     done = plan(of, "1")
@@ -111,7 +112,7 @@ def test_cases_are_solved_at_their_best_within_every_budget(case: Optimum) -> No
         assert size(done) <= 11
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(200)
 @given(of=tasks(), budget=st.integers(0, 6))
 def test_random_tasks_are_solved_at_their_best_within_a_budget(of: Task, budget: int) -> None:
     done = plan(of, "1", options=Options(max_actions=budget))
@@ -158,7 +159,7 @@ def test_where_no_number_of_tries_is_enough_there_is_no_bound() -> None:
     assert list(retries_of(done.tree.root)) == []
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(of=tasks(), target=st.sampled_from(["1/3", "0.9", "0.999"]))
 def test_one_attempt_less_would_miss_the_target(of: Task, target: str) -> None:
     done = plan(of, target, options=DEFAULTS)

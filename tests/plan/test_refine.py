@@ -6,13 +6,13 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
 from bbtc.belief.simulate import simulate
 from bbtc.belief.soundness import violations
-from bbtc.ground.condition import TRUE, Condition, Is, Or, conjunction
+from bbtc.ground.condition import TRUE, And, Condition, Is, Or, conjunction
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -21,6 +21,7 @@ from bbtc.planner.result import Plan
 from bbtc.tree.nodes import ActionNode, walk
 from bbtc.tree.validate import check_tree
 from tests.ground.examples import task_of
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -156,7 +157,7 @@ def test_a_limit_ends_planning_with_the_best_tree_so_far(limits: dict[str, int],
     assert 0 < done.tree.success_probability < Fraction("0.9")
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(of=tasks(), target=st.sampled_from(["0.5", "0.9", "1"]))
 def test_every_plan_of_a_random_task_ends_soundly(of: Task, target: str) -> None:
     done = plan(of, target, nodes=120, states=3000)
@@ -167,3 +168,12 @@ def test_every_plan_of_a_random_task_ends_soundly(of: Task, target: str) -> None
     assert simulate(of, tree.root, limits).success == tree.success_probability
     assert (tree.status == "target-reached") == (tree.success_probability >= Fraction(target))
     assert tree.success_probability == max([done.initial_success, *(s.success for s in done.refinements)])
+
+
+def test_a_part_of_a_goal_that_brought_nothing_is_not_asked_for_again() -> None:
+    """Either fact can be had, and each at the loss of the other: refinement ends, with what it knows."""
+    first = action("first", conjunction([]), ("1", {0: T, 1: F}))
+    second = action("second", conjunction([]), ("1", {1: T, 0: F}))
+    goal = Or((And((Is(0, T), Is(1, T))), And((Is(0, T), Is(2, T)))))
+    done = plan(task("a b c", {}, goal, first, second), "0.9", seconds=60)
+    assert (done.tree.status, done.tree.success_probability) == ("stuck", 0)

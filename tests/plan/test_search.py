@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
@@ -24,6 +24,7 @@ from bbtc.tree.nodes import actions_of, retries_of
 from bbtc.tree.validate import check_tree
 from tests.plan.examples import Optimum, cases
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -131,7 +132,7 @@ def test_cases_are_solved_soundly(case: Optimum) -> None:
     assert done.tree.success_probability <= Fraction(case.best) + Fraction(1, 10**9)
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(120)
 @given(of=tasks(), target=st.sampled_from(["0.5", "0.9", "1"]), retries=st.sampled_from(RETRIES))
 def test_every_plan_of_a_random_task_ends_soundly(of: Task, target: str, retries: Retries) -> None:
     done = plan(of, target, Options(retries=retries), Limits(nodes=120, states=3000))

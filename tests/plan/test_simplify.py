@@ -6,7 +6,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
@@ -23,6 +23,7 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode,
 from bbtc.tree.validate import check_tree
 from tests.domains.brute_force import runs_of
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.strategies import nodes, tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -40,7 +41,7 @@ def simple(of: Task, root: Node) -> Node:
 
 
 @pytest.mark.parametrize("simplification", [idle, simple])
-@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(80)
 @given(data=st.data())
 def test_no_simplification_changes_a_run(
     simplification: Callable[[Task, Node], Node], data: st.DataObject
@@ -62,7 +63,7 @@ def test_no_simplification_changes_a_run(
     check_tree(Tree(of, smaller, after.success, Fraction(1), "stuck"))
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(80)
 @given(data=st.data())
 def test_trees_do_the_same_if_their_runs_are_the_same(data: st.DataObject) -> None:
     of = data.draw(tasks())
@@ -74,7 +75,7 @@ def test_trees_do_the_same_if_their_runs_are_the_same(data: st.DataObject) -> No
         assert said
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(80)
 @given(data=st.data(), target=st.sampled_from(["0.5", "0.9", "1"]))
 def test_what_is_dropped_does_not_cost_the_target(data: st.DataObject, target: str) -> None:
     of = data.draw(tasks())

@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 from fractions import Fraction
 from random import Random
+from unittest.mock import patch
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.state import Values, compile_action, initial_belief
@@ -20,6 +21,7 @@ from bbtc.planner.mdp import transitions as space_actions
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.planner.mdp.state_table import StateTable
+from tests.profiles import examples
 from tests.strategies import tasks
 
 Step = tuple[str, Values, Fraction, Fraction]
@@ -66,7 +68,7 @@ def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
     return found
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(300)
 @given(task=tasks(nested=2))
 def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> None:
     space = explore_space(task, Limits())
@@ -79,15 +81,11 @@ def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> Non
         assert holds == (evaluate(task.goal, values) is Truth.TRUE)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(100)
 @given(task=tasks(nested=2))
 def test_actions_with_very_many_outcomes_and_disjuncts_take_another_way_to_the_same(task: Task) -> None:
-    before = space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES
-    space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES = 1, 1
-    try:
+    with patch.multiple(space_actions, MOST_OUTCOMES=1, MOST_CUBES=1):
         space = explore_space(task, Limits())
-    finally:
-        space_actions._MOST_OUTCOMES, space_actions._MOST_CUBES = before
     assert by_arrays(space) == by_simulator(task)
 
 
@@ -160,7 +158,7 @@ def test_a_limit_leaves_the_rest_unexpanded_and_is_named() -> None:
     assert "3 states" in space.stop.message
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(
     rows=st.lists(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), max_size=40), max_size=20),
     bits=st.sampled_from([0, 3, 62]),
@@ -194,7 +192,7 @@ def test_conditions_of_any_shape_become_cubes() -> None:
     assert space_packing.bit_test(packing, Is(1, Truth.UNKNOWN)) == space_packing.NEVER
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(values=st.lists(st.sampled_from([0, 1, 2]), min_size=90, max_size=90), seed=st.integers(0, 2**32))
 def test_conditions_over_several_words_hold_where_the_semantics_say(values: list[int], seed: int) -> None:
     """A conjunction of what most of the variables are, and one that is wrong in a place."""
@@ -213,7 +211,7 @@ def test_conditions_over_several_words_hold_where_the_semantics_say(values: list
         assert space_packing.holds(packing, test, rows).tolist() == expected
 
 
-@settings(deadline=None, suppress_health_check=list(HealthCheck))
+@examples(100)
 @given(task=tasks(nested=2), every=st.integers(1, 3))
 def test_the_closure_is_what_a_walk_over_single_choices_finds(task: Task, every: int) -> None:
     space = explore_space(task, Limits())

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given
 
 from bbtc.belief.state import Values
 from bbtc.diagnostics import BbtcError, LimitReached
@@ -17,7 +17,6 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.markov import solve
-from bbtc.planner.mdp import maxprob as value_module
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
@@ -27,6 +26,7 @@ from bbtc.planner.mdp.state_space import StateSpace
 from tests.plan.examples import Optimum, cases, corpus_optima
 from tests.plan.test_refine import action, task
 from tests.plan.test_space import by_simulator
+from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
@@ -107,7 +107,7 @@ def after_steps(of: Task, choices: Choices, steps: int) -> dict[Values, Fraction
     return value
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(200)
 @given(of=tasks())
 def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task) -> None:
     """A value that a policy attains and that solves the optimality inequalities is P*."""
@@ -139,7 +139,7 @@ def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task)
     assert solve(rows_of, [wins[s] for s in positive]) == [values[s] for s in positive]
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(100)
 @given(of=tasks())
 def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Task) -> None:
     choices = choices_of(of)
@@ -155,24 +155,21 @@ def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Ta
     assert within.initial[8].lower <= best
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(60)
 @given(of=tasks())
-def test_bounds_from_floats_hold_the_exact_values(of: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bounds_from_floats_hold_the_exact_values(of: Task) -> None:
     exact = solved(of)
     space = exact.space
-    with monkeypatch.context() as patch:
-        patch.setattr(value_module, "_MOST_EXACT", -1)
-        floats = max_prob(space, Limits())
-        patch.setattr("bbtc.planner.mdp.finite_horizon._MOST_EXACT", -1)
-        horizon = horizon_values(space, 5, Limits()) if len(space.edge_successor) else None
+    floats = max_prob(space, Limits(), rationals=False)
+    horizon = horizon_values(space, 5, Limits(), rationals=False)
+    assert horizon.exact == (not len(space.edge_successor))
     for state in range(len(space.states)):
         known, close = exact.bounds(state), floats.bounds(state)
         assert close.lower <= known.lower <= close.upper
         assert close.upper - close.lower < 1e-8
-    if horizon is not None:
-        known_horizon = horizon_values(space, 5, Limits())
-        for a, b in zip(known_horizon.initial, horizon.initial, strict=True):
-            assert b.lower <= a.lower <= b.upper
+    known_horizon = horizon_values(space, 5, Limits())
+    for a, b in zip(known_horizon.initial, horizon.initial, strict=True):
+        assert b.lower <= a.lower <= b.upper
 
 
 def best_probability(space: StateSpace, limits: Limits) -> Bounds:
@@ -183,7 +180,7 @@ def best_probability(space: StateSpace, limits: Limits) -> Bounds:
     return Bounds(low.lower, max_prob(space, limits, space.goal | space.fringe).initial.upper)
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(100)
 @given(of=tasks())
 def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
     whole = explore_space(of, Limits())
@@ -195,7 +192,7 @@ def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
         assert bounds.lower <= known <= bounds.upper
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(of=tasks())
 def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
     found = solved(of)

@@ -154,19 +154,20 @@ def test_an_interrupt_leaves_the_best_tree_so_far(monkeypatch: pytest.MonkeyPatc
 def test_an_interrupted_search_leaves_what_it_knows(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
 ) -> None:
-    from bbtc.planner.mdp.bounded_search import _Search
-
+    """While states are expanded, after so many solutions of what was expanded before."""
     count = 0
-    plunge = _Search._plunge
+    tell = Limits.tell
 
-    def interrupted(*arguments: Any) -> None:
+    def interrupted(limits: Limits, doing: str, *figures: Any) -> None:
         nonlocal count
-        count += 1
-        if count == after:
+        solved = doing == "search for the best probability"
+        if not solved and count == after:
+            count += 1
             raise KeyboardInterrupt
-        plunge(*arguments)
+        count += solved
+        tell(limits, doing, *figures)
 
-    monkeypatch.setattr(_Search, "_plunge", interrupted)
+    monkeypatch.setattr(Limits, "tell", interrupted)
     of = compile_sources([SourceFile("coins.pddl", coins(9))], Report(), Limits())
     tree = plan_task(of, Fraction(1, 2), "policy", Limits(states=2000), lambda _: None).tree
     assert tree.status == "interrupted"

@@ -7,7 +7,7 @@ import itertools
 import random
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
@@ -16,6 +16,7 @@ from bbtc.replay.script import TIMINGS, run_of, script_of
 from bbtc.tree.nodes import Tree
 from tests.domains.problems import PROBLEMS, Problem, plan_of
 from tests.long_form import amount
+from tests.profiles import examples
 from tests.replay.compiled import CompiledReplay, CompiledStockReplay, require_library
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import random_run, varied_runs
@@ -65,7 +66,7 @@ def test_scenarios_run_as_simulated(problem: Problem, engine: type[CompiledRepla
     print(f"{problem}, {engine.profile}: {len(runs)} scenarios compared in three timings")
 
 
-@settings(deadline=None, max_examples=40, suppress_health_check=list(HealthCheck))
+@examples(40)
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_do_not_change_what_a_tree_does(tree: Tree) -> None:
     rng = random.Random(1)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import Report
 from bbtc.source import SourceFile
 from bbtc.syntax.parser import parse
+from tests.profiles import examples
 
 FILES = sorted((Path(__file__).parents[2] / "domains").glob("*/*.pddl"))
 TEXTS = {path: path.read_text("utf-8") for path in FILES}
@@ -55,7 +56,7 @@ def test_a_parenthesis_too_few_or_too_many_gives_one_error_in_its_section() -> N
 
 
 @given(st.data())
-@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(100)
 def test_no_slip_makes_anything_but_diagnostics(data: st.DataObject) -> None:
     text = TEXTS[data.draw(st.sampled_from(FILES))]
     pieces = PIECES.findall(text)
@@ -74,6 +75,5 @@ def test_no_slip_makes_anything_but_diagnostics(data: st.DataObject) -> None:
 
 
 @given(st.lists(st.sampled_from([*"() ?-:;.\n", "define", "domain", ":action", "and", "a", "\x00", "é"])))
-@settings(deadline=None)
 def test_no_text_makes_anything_but_diagnostics(pieces: list[str]) -> None:
     _errors("".join(pieces))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import Report
@@ -13,13 +13,10 @@ from bbtc.syntax import ast
 from bbtc.syntax.parser import parse
 from bbtc.syntax.printer import print_document
 from tests.long_form import amount
+from tests.profiles import examples
 from tests.syntax.trees import documents
 
-SLOW = settings(
-    max_examples=amount(60, 600),
-    deadline=None,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
-)
+SLOW = examples(amount(60, 600))
 GAPS = st.sampled_from(["", "", "", " ; c\n", "\n; own\n", "\n\n  ;; own\n"])
 
 

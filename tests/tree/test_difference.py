@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Hashable
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.ground.condition import Is
 from bbtc.kleene import Truth
 from bbtc.tree.difference import Difference, counts, differences, walk_differences
 from bbtc.tree.nodes import ConditionNode, ControlKind, ControlNode, Node, walk
+from tests.profiles import examples
 
 KINDS: list[ControlKind] = ["sequence", "fallback"]
 
@@ -79,7 +80,7 @@ def test_a_tree_does_not_differ_from_itself(tree: Node) -> None:
     assert counts(found) == (0, 0, 0)
 
 
-@settings(max_examples=300)
+@examples(300)
 @given(TREES, TREES)
 def test_the_alignment_tells_both_trees_at_the_least_cost(old: Node, new: Node) -> None:
     found = differences(old, new, key, key)

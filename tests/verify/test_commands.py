@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc import pipeline
 from bbtc.backends.models.jani import jani, task_text
@@ -19,6 +19,7 @@ from bbtc.tree.nodes import Tree
 from bbtc.verifier import storm, verdict
 from bbtc.verifier.prism import KEYWORDS
 from tests.domains.problems import REPOSITORY, bbtc
+from tests.profiles import examples
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
 FILES = ("domains/household/domain.pddl", "domains/household/look-for-soda.pddl")
@@ -117,7 +118,7 @@ def test_a_task_is_written_as_a_decision_process(form: str) -> None:
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(tree=trees(HOSTILE_NAMES))
 def test_identifiers_are_valid_distinct_and_stable(tree: Tree) -> None:
     names = readable_names(tree_program(tree, {"form": "auto"}))
@@ -128,7 +129,7 @@ def test_identifiers_are_valid_distinct_and_stable(tree: Tree) -> None:
     assert not {name.casefold() for name in made} & {word.casefold() for word in KEYWORDS}
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@examples(150)
 @given(tree=trees(HOSTILE_NAMES))
 def test_no_name_leaves_its_comment(tree: Tree) -> None:
     """Outside comments the text holds only what PRISM is made of."""

@@ -8,7 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.artefacts import load_tree
 from bbtc.belief.simulate import simulate
@@ -26,6 +26,7 @@ from bbtc.verifier.verdict import verify
 from tests.conftest import GOLDEN
 from tests.long_form import amount
 from tests.plan.test_refine import action, task
+from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.strategies import soda_tree, trees
 
@@ -69,7 +70,7 @@ def test_random_trees_full_of_actions(first: int) -> None:
             assert disagreements(tree, found) == {}, (seed, form, most)
 
 
-@settings(max_examples=amount(150, 3000), deadline=None, suppress_health_check=list(HealthCheck))
+@examples(amount(150, 3000))
 @given(tree=trees())
 def test_trees_on_tasks_with_every_construct(tree: Tree) -> None:
     """Chance in chance, several factors, conditional effects, costs and rewards of outcomes."""

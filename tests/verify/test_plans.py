@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import get_args
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import LimitReached
@@ -23,6 +23,7 @@ from bbtc.verifier.prism import prism_text
 from bbtc.verifier.verdict import verify
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases
+from tests.profiles import examples
 from tests.strategies import tasks
 from tests.verify.test_figures import disagreements
 
@@ -45,7 +46,7 @@ def check(tree: Tree) -> None:
         assert (low == high) == answer["exact"]  # more states than that are solved in floats, with bounds
 
 
-@settings(max_examples=amount(120, 2000), deadline=None, suppress_health_check=list(HealthCheck))
+@examples(amount(120, 2000))
 @given(
     task=tasks(),
     strategy=st.sampled_from(list(STRATEGIES)),

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 
 from bbtc.backends.models.jani import jani
 from bbtc.backends.models.jani import task_text as jani_task
@@ -29,6 +29,7 @@ from bbtc.verifier.process import process_of
 from bbtc.verifier.verdict import TOLERANCE, verify
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases
+from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.strategies import HOSTILE_NAMES, soda_tree, tasks, trees
 from tests.verify.optimum import best_probability
@@ -75,7 +76,7 @@ def test_random_trees_full_of_actions(first: int) -> None:
         assert ask(prism_text(program, numbered(program)), TREE) == expected(tree), (seed, form, most)
 
 
-@settings(max_examples=amount(40, 1000), deadline=None, suppress_health_check=list(HealthCheck))
+@examples(amount(40, 1000))
 @given(tree=trees(HOSTILE_NAMES))
 def test_exports_with_hostile_names_are_read_and_mean_the_same(tree: Tree) -> None:
     figures = simulate(tree.task, tree.root, Limits())
@@ -139,7 +140,7 @@ def test_the_listed_values_of_the_cases(case: Optimum) -> None:
     assert ask(prism_task(task), TASK) == [best]
 
 
-@settings(max_examples=amount(100, 2000), deadline=None, suppress_health_check=list(HealthCheck))
+@examples(amount(100, 2000))
 @given(task=tasks())
 def test_the_best_that_any_policy_can_do(task: Task) -> None:
     """Bounds of the planner, our own policy iteration and Storm, which know nothing of one another."""

@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 CHUNK = 2048
 """So many rows are treated together."""
-_MOST_SHARED = 200_000
+MOST_SHARED = 200_000
 """So many distinct values are remembered, which bounds the memory that remembering takes."""
 
 
@@ -79,7 +79,7 @@ class Shared(Generic[T]):
         made = self._made
         fresh = [key for key in dict.fromkeys(keys) if key not in made]
         if fresh:
-            if len(made) + len(fresh) > _MOST_SHARED:
+            if len(made) + len(fresh) > MOST_SHARED:
                 made = self._made = {}
                 fresh = list(dict.fromkeys(keys))
             made.update(zip(fresh, self._make(fresh), strict=True))

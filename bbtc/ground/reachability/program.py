@@ -29,11 +29,11 @@ from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
 
 LETTER = {Truth.TRUE: "t", Truth.FALSE: "f", Truth.UNKNOWN: "u"}
-_FIRST_CHAIN = 9
+FIRST_CHAIN = 9
 """A universal quantifier over fewer objects is written out; over more it becomes a chain."""
-_FEW = 20_000
+FEW_BINDINGS = 20_000
 """Up to so many bindings, a condition is asked for wherever its own objects allow it."""
-_MOST_ALTERNATIVES = 16
+MOST_ALTERNATIVES = 16
 """So many rules at most take the place of one with disjunctions."""
 _LONGEST_BODY = 64
 """A rule with more literals becomes a chain of rules."""
@@ -179,17 +179,18 @@ class ProgramBuilder:
         parameters: tuple[Parameter, ...],
         scope: tuple[Parameter, ...],
         base: tuple[str, ...] = (),
-        most: int = _MOST_ALTERNATIVES,
+        most: int | None = None,
     ) -> Iterator[list[str]]:
         """Bodies of rules that together say where all the formulas, in normal form, can hold: ``base``
         binds what is in ``scope`` besides ``parameters``."""
+        most = MOST_ALTERNATIVES if most is None else most
         parts = list(formulas)
         simple = [part for part in parts if self._is_simple(part)]
         complex_ = [part for part in parts if not self._is_simple(part)]
         near: list[mf.Formula] = []
         far: list[mf.Formula] = []
         for part in complex_:
-            (near if self._count(_read(part, scope)) <= _FEW else far).append(part)
+            (near if self._count(_read(part, scope)) <= FEW_BINDINGS else far).append(part)
         for part in far:
             alternatives = list(disjuncts(part))
             if 1 < len(alternatives) <= most:
@@ -349,7 +350,7 @@ class ProgramBuilder:
 
     def _all(self, parameter: Parameter, part: mf.Formula, context: list[str]) -> Iterator[str | None]:
         members = self.universe.members(parameter.types)
-        if len(members) < _FIRST_CHAIN:
+        if len(members) < FIRST_CHAIN:
             body: list[str] | None = context
             for member in members:
                 instance = mf.substitute(part, {parameter.name: self.universe.names[member]})

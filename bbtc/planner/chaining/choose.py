@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeAlias
 
 from typing_extensions import assert_never
 
@@ -27,6 +28,9 @@ UNMET_DISCOUNT = Fraction(4, 5)
 """A candidate's score is multiplied by this for every precondition that does not hold yet."""
 
 
+_Tried: TypeAlias = tuple[frozenset[Condition], ...]
+
+
 @dataclass(frozen=True, slots=True)
 class Flaw:
     """A failed condition (a flaw, as partial-order planning has it): the subgoal, what it was (false or
@@ -36,7 +40,7 @@ class Flaw:
     value: Truth
     states: tuple[tuple[State, Fraction], ...]
     excluded: frozenset[str] = frozenset()
-    """Names not to insert: what was inserted already and never started in these states (once
+    """Keys of candidates not to insert: what was inserted already and never started in these states (once
     more, it would not start either), and what was taken back before."""
 
     @property
@@ -65,6 +69,11 @@ class Candidate:
         return self.doing.name if self.doing is not None else "(a part of the disjunction)"
 
     @property
+    def key(self) -> str:
+        """What tells it from the others of a subgoal: the ground name, or which part it is."""
+        return self.name if self.doing is not None else repr(self.conditions)
+
+    @property
     def score(self) -> Fraction:
         """Probability of success, discounted for every unmet precondition."""
         return (self.success + self.observable * OBSERVABLE_SHARE) * UNMET_DISCOUNT**self.unmet
@@ -85,7 +94,7 @@ class Chooser:
         self.relaxation = Relaxation(task, limits)
         self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
-        self._helps: dict[tuple[Subgoal, int, Truth, Values, frozenset[str]], bool] = {}
+        self._helps: dict[tuple[Subgoal, _Tried, Truth, Values, frozenset[str]], bool] = {}
         doings: list[Doing] = [*task.actions, *task.templates]
         for doing in doings:
             for fact in sorted({fact for effect in effects_of(doing.factors) for fact in effect.sets}):
@@ -94,8 +103,7 @@ class Chooser:
     def helps(self, flaw: Flaw) -> bool:
         """Is there any candidate for a flaw of one state?"""
         ((state, _),) = flaw.states
-        attempts = len(flaw.subgoal.sensing) + len(flaw.subgoal.acting)
-        key = (flaw.subgoal, attempts, flaw.value, state.values, flaw.excluded)
+        key = (flaw.subgoal, tried_parts(flaw.subgoal), flaw.value, state.values, flaw.excluded)
         if key not in self._helps:
             self._helps[key] = bool(self.candidates(flaw))
         return self._helps[key]
@@ -206,13 +214,20 @@ class Chooser:
             parts = (goal,)
         else:
             return
-        tried = [frozenset(p.condition for p in a.preconditions) for a in flaw.subgoal.attempts()]
+        tried = tried_parts(flaw.subgoal)
         for part in parts:
             conditions = conjuncts(part)
             states = [(s, p) for s, p in flaw.states if self._applicable(conditions, s)]
             if states and frozenset(conditions) not in tried:
                 share = sum((p for _, p in states), Fraction(0)) / flaw.probability
-                yield Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
+                part_of_it = Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
+                if part_of_it.key not in flaw.excluded:
+                    yield part_of_it
+
+
+def tried_parts(subgoal: Subgoal) -> _Tried:
+    """What each attempt at a subgoal asks for first: what was tried is not tried again."""
+    return tuple(frozenset(p.condition for p in attempt.preconditions) for attempt in subgoal.attempts())
 
 
 def helpful(condition: Condition, value: Truth) -> Iterator[tuple[int, Truth]]:

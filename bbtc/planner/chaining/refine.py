@@ -95,7 +95,7 @@ class _Refiner:
         best = self.finder.chooser.candidates(flaw)[0]
         undo = self.insert(flaw, best)
         refinement = Refinement("insert", *common, best.name, best.success, best.observable, best.unmet)
-        return _Change(refinement, undo, (flaw.subgoal, flaw.value, best.name))
+        return _Change(refinement, undo, (flaw.subgoal, flaw.value, best.key))
 
     def insert(self, flaw: Flaw, candidate: Candidate) -> Callable[[], None]:
         """Put the candidate under the flaw: a perception under a Skipper where the condition is

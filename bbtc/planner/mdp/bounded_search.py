@@ -31,7 +31,9 @@ from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
 
 _CLOSED = 1e-9  # bounds this close have met
-_SMALLEST = 256  # states expanded at a time, at least
+SMALLEST_STEP = 256
+"""States expanded at a time, at least."""
+
 _SHARE = 4  # else this part of those expanded before
 _OFTEN = 100  # solutions in which the expanded states did not become twice as many; from then on
 _LEAST_SHARE = 16  # at least this part of them is expanded
@@ -69,15 +71,18 @@ class _Solved:
         return Bounds(low, max(low, self.upper.initial.upper))
 
 
-def search_bounds(task: Task, limits: Limits, target: Fraction | None = None) -> Searched:
+def search_bounds(
+    task: Task, limits: Limits, target: Fraction | None = None, *, step: int = SMALLEST_STEP
+) -> Searched:
     """Search until the bounds on P* have met, or tell whether the target can be reached, or a limit
-    is met. Raises ``LimitReached`` only if the time is over before anything was found."""
-    return _Search(task, limits, target).run()
+    is met. At least ``step`` states are expanded at a time. Raises ``LimitReached`` only if the time is over
+    before anything was found."""
+    return _Search(task, limits, target, step).run()
 
 
 class _Search:
-    def __init__(self, task: Task, limits: Limits, target: Fraction | None) -> None:
-        self.limits, self.target = limits, target
+    def __init__(self, task: Task, limits: Limits, target: Fraction | None, step: int) -> None:
+        self.limits, self.target, self.step = limits, target, step
         self.explorer = Explorer(task, limits)
         self.heuristic = Relaxation(task, limits, count_actions=True)
         self.probability = np.empty(0)
@@ -165,9 +170,9 @@ class _Search:
 
     def _plunge(self, frontier: Index, mass: Floats) -> None:
         """Expand fringe states, and from each follow the choice that the heuristic prefers."""
-        budget = max(_SMALLEST, self.expanded // _SHARE)
+        budget = max(self.step, self.expanded // _SHARE)
         least = self.expanded + (self.expanded // _LEAST_SHARE if self._solved_often() else 0)
-        share = max(1, _SMALLEST // 4, budget // 2)
+        share = max(1, self.step // 4, budget // 2)
         while len(frontier) and budget > 0:
             chosen = np.argsort(-mass, kind="stable")[: min(share, budget)]
             chosen = chosen[np.argsort(frontier[chosen], kind="stable")]

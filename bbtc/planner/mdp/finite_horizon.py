@@ -31,13 +31,16 @@ class Horizon:
     exact: bool
 
 
-def horizon_values(space: StateSpace, steps: int, limits: Limits, goal: Flags | None = None) -> Horizon:
+def horizon_values(
+    space: StateSpace, steps: int, limits: Limits, goal: Flags | None = None, *, rationals: bool = True
+) -> Horizon:
     """Values for 0, 1, … ``steps`` actions of reaching ``goal`` (by default the task's). They are those
-    of the task if the space is expanded to that depth at least.
+    of the task if the space is expanded to that depth at least. Without ``rationals`` they are left
+    to floats.
 
     Raises ``LimitReached`` when the time is over.
     """
-    if len(space.edge_successor) * steps <= _MOST_EXACT:
+    if len(space.edge_successor) * steps <= (_MOST_EXACT if rationals else 0):
         return _exact(space, steps, limits, space.goal if goal is None else goal)
     graph = Graph(space)
     weight = draw_probabilities(space)

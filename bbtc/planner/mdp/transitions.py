@@ -30,8 +30,11 @@ from bbtc.planner.mdp.packing import (
 
 Index: TypeAlias = npt.NDArray[np.int64]
 
-_MOST_OUTCOMES = 128  # joint outcomes of one action; above, results are merged factor by factor
-_MOST_CUBES = 32  # disjuncts of one condition
+MOST_OUTCOMES = 128
+"""Joint outcomes of one action; above, results are merged factor by factor."""
+
+MOST_CUBES = 32
+"""Disjuncts of one condition; above, it is evaluated state by state."""
 _FEW_CELLS = 1 << 16  # states times preconditions that are tried one with each other
 
 
@@ -117,7 +120,7 @@ class ActionTables:
         rows: list[tuple[int, Cube]] = []
         for number, action in enumerate(self.task.actions):
             test = bit_test(self.packing, action.precondition)
-            found = cubes(test, _MOST_CUBES)
+            found = cubes(test, MOST_CUBES)
             if found is None:
                 self.general.append((number, test))
             else:
@@ -187,7 +190,7 @@ class ActionTables:
             (sets if effect.when is None else by_guard.setdefault(effect.when, [])).extend(effect.sets)
         guarded: list[tuple[Cube, _Masks]] = []
         for guard, assignments in by_guard.items():
-            found = cubes(bit_test(self.packing, guard), _MOST_CUBES)
+            found = cubes(bit_test(self.packing, guard), MOST_CUBES)
             if found is None:
                 return None
             guarded.extend((cube, _Masks.of(self.packing, assignments)) for cube in found)
@@ -332,7 +335,7 @@ def _joint(factors: tuple[Factor, ...]) -> dict[_Joint, Fraction] | None:
     total: dict[_Joint, Fraction] | None = None
     for factor in factors:
         drawn = _drawn(factor)
-        if drawn is None or (0 if total is None else len(total)) * len(drawn) > 8 * _MOST_OUTCOMES:
+        if drawn is None or (0 if total is None else len(total)) * len(drawn) > 8 * MOST_OUTCOMES:
             return None
         if total is None:
             total = drawn
@@ -345,7 +348,7 @@ def _joint(factors: tuple[Factor, ...]) -> dict[_Joint, Fraction] | None:
         total = combined
     if total is None:
         return {(frozenset(), Fraction(0), Fraction(0), ()): Fraction(1)}
-    return total if len(total) <= _MOST_OUTCOMES else None
+    return total if len(total) <= MOST_OUTCOMES else None
 
 
 def _drawn(factor: Factor) -> dict[_Joint, Fraction] | None:
