@@ -72,6 +72,7 @@ def test_a_format_of_several_files_goes_into_a_folder(
 ) -> None:
     from bbtc.backends import registry
     from bbtc.backends.exporter import Files
+    from bbtc.manifest import read
 
     class Several:
         name, description, suffix, options = "several", "for tests", "", ()
@@ -81,7 +82,7 @@ def test_a_format_of_several_files_goes_into_a_folder(
             return Files({"a.txt": "a\n", "sub/b.txt": "b\n"})
 
     original = registry.load_exporter
-    for module in (registry, sys.modules["bbtc.manifest.read"]):
+    for module in (registry, read):
         monkeypatch.setattr(
             module, "load_exporter", lambda form: Several() if form == "several" else original(form)
         )
