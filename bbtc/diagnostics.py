@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from typing import cast
 
-from bbtc.codes import CODES, ROOT_CAUSES
+from bbtc.codes import CODES, Severity, exit_status
+from bbtc.exit_status import ExitStatus
 from bbtc.printable import printable, printable_line
 from bbtc.source import Span
 
+__all__ = ["BbtcError", "Diagnostic", "LimitReached", "Related", "Report", "Severity", "Unreadable"]
 
-class Severity(enum.Enum):
-    """How grave a diagnostic is; only errors stop a command."""
-
-    ERROR = "error"
-    WARNING = "warning"
-    NOTE = "note"
+_OF_CODE = cast("Severity", None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,19 +27,28 @@ class Related:
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
     """One message. ``code`` is a key of :data:`bbtc.codes.CODES`. ``message`` and ``hint`` are one line each;
-    ``lines`` are those of a file, or of a difference, that are shown below the message."""
+    ``lines`` are those of a file, or of a difference, that are shown below the message. ``severity`` is that
+    of the code unless a lesser one is given. ``about`` are the names that tell it from others of its code in
+    its place; ``path`` leads to its place in a tree or an artefact as long as no text has it."""
 
     code: str
     message: str
     span: Span | None = None
     hint: str | None = None
-    severity: Severity = Severity.ERROR
+    severity: Severity = _OF_CODE
     related: tuple[Related, ...] = ()
     lines: tuple[str, ...] = ()
+    about: tuple[str, ...] = ()
+    path: tuple[str | int, ...] = ()
 
     def __post_init__(self) -> None:
         if self.code not in CODES:
             raise ValueError(f"undocumented diagnostic code {self.code}")
+        gravest = CODES[self.code].severity
+        if cast("Severity | None", self.severity) is None:
+            object.__setattr__(self, "severity", gravest)
+        elif self.severity.rank < gravest.rank:
+            raise ValueError(f"{self.code} is no {self.severity.value}")
 
     @property
     def told(self) -> str:
@@ -121,22 +127,39 @@ class Report:
 
 
 def _place_key(diagnostic: Diagnostic) -> tuple[bool, str, int]:
-    span, follows = diagnostic.span, diagnostic.code not in ROOT_CAUSES
+    span, follows = diagnostic.span, not CODES[diagnostic.code].root_cause
     return (follows, span.source.name, span.start) if span else (follows, "", -1)
 
 
 class BbtcError(Exception):
-    """The input cannot be processed; carries every diagnostic of the run (exit status 1)."""
+    """The input cannot be processed; carries every diagnostic of the run."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
         super().__init__("\n".join(d.render() for d in self.diagnostics))
+
+    def __reduce__(self) -> tuple[type[BbtcError], tuple[tuple[Diagnostic, ...]]]:
+        return type(self), (self.diagnostics,)  # else a pickle would hold the text alone
 
     @classmethod
     def single(cls, code: str, message: str, span: Span | None = None, hint: str | None = None) -> BbtcError:
         """An error of one diagnostic."""
         return cls([Diagnostic(code, message, span, hint)])
 
+    @property
+    def exit_status(self) -> ExitStatus:
+        """What a command ends with that this stops."""
+        errors = [each.code for each in self.diagnostics if each.severity is Severity.ERROR]
+        return exit_status(errors) or ExitStatus.ERRORS
+
+
+class Unreadable(Exception):
+    """A part of an input cannot be read. What reads the whole takes note of it, and reads on."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        self.diagnostic = diagnostic
+        super().__init__(diagnostic.message)
+
 
 class LimitReached(BbtcError):
-    """A limit (time, states, nodes, memory) stopped the work (exit status 3)."""
+    """A limit (time, states, nodes, memory) stopped the work."""

@@ -1,8 +1,22 @@
-"""What is reached from what: strongly connected components of a directed graph."""
+"""Finite Markov chains: strongly connected components of their graph, and linear systems over them, exactly.
+
+Components are found by depth-first search (Tarjan 1972). A system x = P x + c is solved one component at a
+time; a component of one state is a plain sum, so acyclic chains cost one pass, and loops are solved by
+Gaussian elimination over rationals, the state with the fewest links first (minimum degree: Markowitz 1957).
+
+``bbtc.verifier`` has a solver of its own on purpose: what it recomputes must not rest on this one.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import TypeAlias
+
+Row: TypeAlias = dict[int, Fraction]
+"""Probabilities by successor; what is missing to 1 leaves the chain."""
+
+_ZERO = Fraction(0)
 
 
 def components(successors: Sequence[Sequence[int]]) -> list[list[int]]:
@@ -26,14 +40,14 @@ def components(successors: Sequence[Sequence[int]]) -> list[list[int]]:
                 on_stack[node] = True
             descend = False
             for at in range(position, len(successors[node])):
-                target = successors[node][at]
-                if not number[target]:
+                successor = successors[node][at]
+                if not number[successor]:
                     work.append((node, at + 1))
-                    work.append((target, 0))
+                    work.append((successor, 0))
                     descend = True
                     break
-                if on_stack[target]:
-                    low[node] = min(low[node], low[target])
+                if on_stack[successor]:
+                    low[node] = min(low[node], low[successor])
             if descend:
                 continue
             if low[node] == number[node]:
@@ -49,3 +63,105 @@ def components(successors: Sequence[Sequence[int]]) -> list[list[int]]:
                 parent = work[-1][0]
                 low[parent] = min(low[parent], low[node])
     return found
+
+
+def solve(
+    rows: Sequence[Mapping[int, Fraction]],
+    constant: Sequence[Fraction],
+    order: Iterable[Sequence[int]] | None = None,
+    *,
+    most_work: int | None = None,
+    look: Callable[[], None] = lambda: None,
+) -> list[Fraction] | None:
+    """x with x = P x + c, exactly, for a chain that leaves every loop.
+
+    ``order`` has the components of the chain, each after all that it can reach, where they are known; states
+    that are in none of them get value 0. None if a component takes more than ``most_work`` steps of
+    elimination. ``look`` is called now and then, and may raise an exception.
+    """
+    values: list[Fraction] = [_ZERO] * len(rows)
+    for count, component in enumerate(components([tuple(row) for row in rows]) if order is None else order):
+        if count % 256 == 0:
+            look()
+        if len(component) == 1:
+            (state,) = component
+            total, loop = constant[state], _ZERO
+            for successor, p in rows[state].items():
+                if successor == state:
+                    loop = p
+                else:
+                    total += p * values[successor]
+            values[state] = total / (1 - loop) if loop else total
+            continue
+        inside = set(component)
+        system: dict[int, Row] = {}
+        known: dict[int, Fraction] = {}
+        for state in component:
+            known[state] = constant[state]
+            system[state] = {}
+            for successor, p in rows[state].items():
+                if successor in inside:
+                    system[state][successor] = p
+                else:
+                    known[state] += p * values[successor]
+        if not _eliminate(system, known, values, most_work, look):
+            return None
+    return values
+
+
+def _eliminate(
+    rows: dict[int, Row],
+    constant: dict[int, Fraction],
+    values: list[Fraction],
+    most_work: int | None,
+    look: Callable[[], None],
+) -> bool:
+    """Put the solution of one component into ``values``; False if it is too much work."""
+    users: dict[int, set[int]] = {state: set() for state in rows}
+    for state, row in rows.items():
+        for successor in row:
+            users[successor].add(state)
+    order: list[int] = []
+    work = 0
+    buckets: dict[int, dict[int, None]] = {}
+
+    def degree(state: int) -> int:
+        return len(rows[state]) * len(users[state])
+
+    place = {state: degree(state) for state in rows}
+    for state in sorted(rows):
+        buckets.setdefault(place[state], {})[state] = None
+    left = len(rows)
+    while left:
+        if left % 64 == 0:
+            look()
+        lowest = min(key for key, members in buckets.items() if members)
+        pivot = next(iter(buckets[lowest]))
+        del buckets[lowest][pivot]
+        left -= 1
+        row = rows[pivot]
+        scale = 1 / (1 - row.pop(pivot, _ZERO))
+        users[pivot].discard(pivot)
+        for successor in row:
+            row[successor] *= scale
+            users[successor].discard(pivot)
+        constant[pivot] *= scale
+        order.append(pivot)
+        touched = set(users[pivot]) | set(row)
+        for user in users[pivot]:
+            factor = rows[user].pop(pivot)
+            other = rows[user]
+            work += len(row) + 1
+            for successor, p in row.items():
+                other[successor] = other.get(successor, _ZERO) + factor * p
+                users[successor].add(user)
+            constant[user] += factor * constant[pivot]
+        if most_work is not None and work > most_work:
+            return False
+        for state in sorted(touched):
+            buckets[place[state]].pop(state, None)
+            place[state] = degree(state)
+            buckets.setdefault(place[state], {})[state] = None
+    for state in reversed(order):
+        values[state] = constant[state] + sum((p * values[t] for t, p in rows[state].items()), _ZERO)
+    return True

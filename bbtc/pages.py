@@ -11,9 +11,7 @@ from bbtc.codes import CODES
 def page(code: str) -> str:
     """The page of a registered code, in Markdown: package data in a wheel, ``docs/errors/`` in a
     checkout. Raises ``KeyError`` for a code that is not registered."""
-    if code not in CODES:
-        raise KeyError(code)
-    packaged = files("bbtc") / "errors" / f"{code}.md"
+    packaged = files("bbtc") / "errors" / CODES[code].page
     if packaged.is_file():
         return packaged.read_text("utf-8")
-    return (Path(__file__).parents[1] / "docs" / "errors" / f"{code}.md").read_text("utf-8")
+    return (Path(__file__).parents[1] / "docs" / "errors" / CODES[code].page).read_text("utf-8")

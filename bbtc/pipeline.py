@@ -14,11 +14,10 @@ from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Repor
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.model.domain import Model
-from bbtc.planner.options import DEFAULTS, Options
 from bbtc.rounding import figure_text
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
 from bbtc.syntax.ast import Definition, Document, DomainReference
-from bbtc.tree.nodes import Status, Tree
+from bbtc.tree.nodes import PlanStatus, Tree
 
 if TYPE_CHECKING:
     from bbtc.backends.btcpp.reader.xml import Imported
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from bbtc.belief.chain import Chain
     from bbtc.belief.simulate import Figures
     from bbtc.comparison import Comparison
+    from bbtc.planner.options import Options
     from bbtc.planner.result import Plan, Progress
     from bbtc.verifier.verdict import Engine, Verdict
 
@@ -346,7 +346,7 @@ def _with_figures(imported: Imported, source: SourceFile, report: Report, limits
     if success == imported.claimed:
         return tree
     if success >= tree.target:
-        status: Status = "target-reached"
+        status: PlanStatus = "target-reached"
     else:
         status = "stuck" if tree.status == "target-reached" else tree.status
     return replace(tree, success_probability=success, status=status)
@@ -368,7 +368,7 @@ def plan_task(
     limits: Limits,
     progress: Progress,
     *,
-    options: Options = DEFAULTS,
+    options: Options | None = None,
     search_begins: Callable[[], None] = lambda: None,
     search_ends: Callable[[], None] = lambda: None,
 ) -> Plan:
@@ -386,10 +386,12 @@ def plan_task(
     from bbtc.belief.soundness import violations
     from bbtc.planner.best_tree import BestTree
     from bbtc.planner.bounds import judged
+    from bbtc.planner.options import DEFAULTS
     from bbtc.planner.strategies import run_strategy
     from bbtc.tree.validate import check_tree
 
     wanted = task.goal_probability if target is None else target
+    options = options or DEFAULTS
     best = BestTree(task, wanted)
     searching = limits.but_for(_LAST_STEPS)
     plan: Plan | None = None

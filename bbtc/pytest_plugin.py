@@ -17,7 +17,7 @@ import pytest
 
 if TYPE_CHECKING:
     from bbtc.builder.job import Made
-    from bbtc.manifest.read import Manifest, TreeEntry
+    from bbtc.manifest.entries import Manifest, TreeEntry
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

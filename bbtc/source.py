@@ -44,6 +44,10 @@ class SourceFile:
             self._line_starts.extend(starts)
         return self._line_starts
 
+    def span(self, start: int, end: int) -> Span:
+        """The place from one offset to another, as far as the text goes."""
+        return Span(self, min(start, len(self.text)), min(end, len(self.text)))
+
     def position(self, offset: int) -> tuple[int, int]:
         """1-based line and column of a character offset."""
         starts = self.line_starts

@@ -27,7 +27,7 @@ from bbtc.ground.task import (
     Variable,
 )
 from bbtc.kleene import Truth
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Status, Tree
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, PlanStatus, Tree
 
 PLAIN_NAMES = st.sampled_from(["a", "at", "b-2", "door_open", "is", "n1", "true", "x", "y"])
 
@@ -68,7 +68,7 @@ HOSTILE_NAMES = st.one_of(
 )
 CONTROL_KINDS: list[ControlKind] = ["sequence", "fallback", "skipper"]
 BODY_KINDS: list[Literal["sequence", "fallback", "skipper"]] = ["sequence", "fallback", "skipper"]
-STATUSES: list[Status] = ["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
+STATUSES: list[PlanStatus] = ["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
 
 
 # A random task takes hundreds of choices, and what Hypothesis does for each costs more than what most tests

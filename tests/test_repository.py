@@ -98,8 +98,18 @@ def test_the_page_on_architecture_names_every_part() -> None:
     }
     assert parts <= {*named}
     assert {*named} <= parts
-    for name in re.findall(r"`([\w/]+\.(?:py|md|lark))`", page):
-        assert any((REPOSITORY / top / name).exists() for top in ("", "bbtc")), name
+    folders = {path.parent.relative_to(REPOSITORY / "bbtc").as_posix() for path in SOURCES} - {"."}
+    assert {folder for folder in folders if f"`{folder}/`" not in table} == set()
+
+
+def test_every_place_that_the_page_on_architecture_names_is_there() -> None:
+    page = text_of(REPOSITORY / "docs" / "architecture.md")
+    places = re.findall(r"`((?:[\w.-]+/)+[\w.-]*|[\w-]+\.(?:py|md|lark|toml))`", page)
+    assert len(places) > 100
+    for place in places:
+        found = [REPOSITORY / top / place for top in ("", "bbtc") if (REPOSITORY / top / place).exists()]
+        assert found, place
+        assert place.endswith("/") == found[0].is_dir(), place
 
 
 def test_the_page_on_tests_names_every_long_form() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from typing_extensions import assert_never
 
@@ -73,27 +73,11 @@ def _call(names: Names, node: ast.BodyCall, scope: Scope) -> md.Body:
 # --- rules -----------------------------------------------------------------------------------
 
 
-def calls(body: md.Body) -> Iterator[md.BodyCall]:
-    """The calls in a body, from left to right."""
-    match body:
-        case md.BodyCall():
-            yield body
-        case md.BodyControl(_, children):
-            for child in children:
-                yield from calls(child)
-        case md.BodyForeach(_, child):
-            yield from calls(child)
-        case md.BodyCondition():
-            return
-        case _:
-            assert_never(body)
-
-
 def check_templates(report: Report, templates: Mapping[str, md.Template]) -> None:
     """No template may call itself, however far down; in a Skipper only the last child may
     contain actions (with more, our simulator and the execution engines part ways)."""
     called = {
-        name: [call for call in calls(each.body) if call.kind == "template" and call.name in templates]
+        name: [call for call in md.calls(each.body) if call.kind == "template" and call.name in templates]
         for name, each in templates.items()
     }
     round_about = _circles(called)
@@ -127,7 +111,7 @@ def _acting(templates: Mapping[str, md.Template]) -> set[str]:
     callers: dict[str, list[str]] = {}
     todo: list[str] = []
     for name, each in templates.items():
-        for call in calls(each.body):
+        for call in md.calls(each.body):
             if call.kind == "action":
                 todo.append(name)
             else:
@@ -142,7 +126,7 @@ def _acting(templates: Mapping[str, md.Template]) -> set[str]:
 
 
 def _acts(body: md.Body, acting: set[str]) -> bool:
-    return any(call.kind == "action" or call.name in acting for call in calls(body))
+    return any(call.kind == "action" or call.name in acting for call in md.calls(body))
 
 
 def _check_skippers(report: Report, body: md.Body, acting: set[str]) -> None:

@@ -7,14 +7,14 @@ warning only where it holds for every one of several problems.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from typing_extensions import assert_never
 
 from bbtc.analysis import facts
-from bbtc.analysis.bodies import calls
+from bbtc.analysis.facts import Known, Reading
 from bbtc.analysis.requirements import missing, unneeded
 from bbtc.diagnostics import Diagnostic, Related, Severity
 from bbtc.kleene import Truth
@@ -34,7 +34,7 @@ class Check:
     """A check and the code of its findings. ``needs_problem``: they rest on what a problem says."""
 
     code: str
-    find: Callable[[md.Model], Iterator[Diagnostic]]
+    find: Callable[[Known], Iterator[Diagnostic]]
     needs_problem: bool = False
 
 
@@ -42,24 +42,25 @@ def check(*models: md.Model, doubted: Collection[str] = ()) -> Iterator[Diagnost
     """The findings about a domain: the models are those of one domain with each of its problems, or
     that of the domain alone. Of problems named in ``doubted`` the goal or the start is known to be wrong:
     what rests on them would only repeat it, and is not looked for."""
-    settled = tuple(model for model in models if model.problem not in doubted)
+    known = tuple(map(Known, models))
+    settled = tuple(each for each in known if each.model.problem not in doubted)
     for each in CHECKS:
         if not each.needs_problem:
-            yield from _merged(each, models)
+            yield from _merged(each, known)
         elif models[0].problem is not None and settled:
             yield from _merged(each, settled)
 
 
-def _merged(each: Check, models: tuple[md.Model, ...]) -> Iterator[Diagnostic]:
+def _merged(each: Check, models: tuple[Known, ...]) -> Iterator[Diagnostic]:
     """What a check finds in a problem, and what it finds in the domain with every problem."""
-    rounds = [(model, list(each.find(model))) for model in models]
-    keys = [{(found.message, found.span) for found in findings} for _, findings in rounds]
+    rounds = [(known.model, list(each.find(known))) for known in models]
+    keys = [{(found.span, found.about) for found in findings} for _, findings in rounds]
     common = set.intersection(*keys)
     for number, (model, findings) in enumerate(rounds):
         for found in findings:
             if _in_problem(model, found.span):
                 yield found
-            elif number == 0 and (found.message, found.span) in common:
+            elif number == 0 and (found.span, found.about) in common:
                 note = each.needs_problem and len(models) == 1
                 yield replace(found, severity=Severity.NOTE) if note else found
 
@@ -75,37 +76,32 @@ def _in_problem(model: md.Model, span: Span | None) -> bool:
     return span.start > problem.start if problem.start > domain.start else span.start < domain.start
 
 
-def _warning(
-    code: str, message: str, span: Span | None, hint: str | None = None, related: tuple[Related, ...] = ()
-) -> Diagnostic:
-    return Diagnostic(code, message, span, hint, Severity.WARNING, related)
-
-
 # --- predicates and conditions ---------------------------------------------------------------
 
 
-def _unread(model: md.Model) -> Iterator[tuple[md.Predicate, bool]]:
+def _unread(known: Known) -> Iterator[tuple[md.Predicate, bool]]:
     """Predicates that nothing reads, each with whether anything sets it."""
-    read = {atom.predicate for formula in facts.all_conditions(model) for atom in mf.atoms(formula)}
+    model = known.model
+    read = {atom.predicate for formula in known.conditions for atom in mf.atoms(formula)}
     for schema in model.schemas.values():
         read |= facts.observed(schema)
-    written = {leaf.predicate for schema in model.schemas.values() for leaf in facts.settings(schema.effect)}
+    written = {leaf.predicate for schema in model.schemas.values() for leaf in me.settings(schema.effect)}
     written |= {rule.predicate for rule in model.rules}
     for name, predicate in model.predicates.items():
         if name not in read:
             yield predicate, name in written
 
 
-def _unused_predicates(model: md.Model) -> Iterator[Diagnostic]:
-    for predicate, written in _unread(model):
+def _unused_predicates(known: Known) -> Iterator[Diagnostic]:
+    for predicate, written in _unread(known):
         if not written and not predicate.inferred:
-            yield _warning("BBT0301", f"predicate `{predicate.name}` is never used", predicate.span)
+            yield Diagnostic("BBT0301", f"predicate `{predicate.name}` is never used", predicate.span)
 
 
-def _unread_predicates(model: md.Model) -> Iterator[Diagnostic]:
-    for predicate, written in _unread(model):
+def _unread_predicates(known: Known) -> Iterator[Diagnostic]:
+    for predicate, written in _unread(known):
         if written:
-            yield _warning(
+            yield Diagnostic(
                 "BBT0301",
                 f"nothing reads predicate `{predicate.name}`",
                 predicate.span,
@@ -113,12 +109,12 @@ def _unread_predicates(model: md.Model) -> Iterator[Diagnostic]:
             )
 
 
-def _never_unknown(model: md.Model) -> Iterator[Diagnostic]:
-    reached = facts.reached(model)
-    for name, predicate in model.predicates.items():
+def _never_unknown(known: Known) -> Iterator[Diagnostic]:
+    reached = known.reached
+    for name, predicate in known.model.predicates.items():
         others = predicate.external  # who may make it unknown
         if predicate.declared_three_valued and not others and (name, Truth.UNKNOWN) not in reached.values:
-            yield _warning(
+            yield Diagnostic(
                 "BBT0218",
                 f"`{name}` is declared three-valued, but nothing makes it unknown",
                 predicate.span,
@@ -128,13 +124,13 @@ def _never_unknown(model: md.Model) -> Iterator[Diagnostic]:
             )
 
 
-def _test_words(model: md.Model) -> Iterator[Diagnostic]:
-    for name in sorted(TEST_WORDS & model.predicates.keys()):
-        predicate = model.predicates[name]
+def _test_words(known: Known) -> Iterator[Diagnostic]:
+    for name in sorted(TEST_WORDS & known.model.predicates.keys()):
+        predicate = known.model.predicates[name]
         theirs = f"`({name} a)` is a fact of it, " if len(predicate.parameters) == 1 else ""
         message = f"the predicate `{name}` has the name of a test"
         hint = f"{theirs}`({name} (p))` tests the fact `(p)`"
-        yield Diagnostic("BBT0227", message, predicate.span, hint, Severity.NOTE)
+        yield Diagnostic("BBT0227", message, predicate.span, hint)
 
 
 def _set_to(model: md.Model, *, unknown: bool) -> set[str]:
@@ -142,89 +138,105 @@ def _set_to(model: md.Model, *, unknown: bool) -> set[str]:
     return {
         leaf.predicate
         for schema in model.schemas.values()
-        for leaf in facts.settings(schema.effect)
+        for leaf in me.settings(schema.effect)
         if (leaf.value is Truth.UNKNOWN) is unknown
     }
 
 
-def _never_known(model: md.Model, lost: set[str]) -> Iterator[Diagnostic]:
-    """Readings of the values of ``lost`` predicates, those that are unknown at some time, that
-    nothing ever tells."""
+def _untold(known: Known, lost: Collection[str]) -> Iterator[Reading]:
+    """The first reading of the value of each of the ``lost`` predicates, those that are unknown at some time,
+    that nothing ever tells."""
+    model = known.model
     told = _set_to(model, unknown=False) | {
         atom.predicate for sensor in model.sensors for atom in mf.atoms(sensor.sensed)
     }
     for schema in model.schemas.values():
         told |= facts.observed(schema)
-    for formula in facts.all_conditions(model):
-        for reading in facts.readings(formula):
-            predicate = model.predicates[reading.atom.predicate]
-            if reading.value is Truth.UNKNOWN or predicate.name not in lost or predicate.name in told:
-                continue
-            if not predicate.derived and not predicate.external:
-                told.add(predicate.name)
-                yield _warning(
-                    "BBT0304",
-                    f"no action makes `{predicate.name}` known",
-                    reading.span,
-                    "it is unknown at some time, and no effect makes it true or false again",
-                    (Related(f"`{predicate.name}` is declared here", predicate.span),),
-                )
+    for reading in known.readings:
+        predicate = model.predicates[reading.atom.predicate]
+        if reading.value is Truth.UNKNOWN or predicate.name not in lost or predicate.name in told:
+            continue
+        if not predicate.derived and not predicate.external:
+            told.add(predicate.name)
+            yield reading
 
 
-def _lost_knowledge(model: md.Model) -> Iterator[Diagnostic]:
-    yield from _never_known(model, _set_to(model, unknown=True))
+def _lost_later(known: Known) -> Iterator[Reading]:
+    return _untold(known, _set_to(known.model, unknown=True))
 
 
-def _hopeless_conditions(model: md.Model) -> Iterator[Diagnostic]:
-    """Readings of values that nothing gives; those of external predicates have a note of their own."""
-    return (found for found in _never_so(model) if found.code == "BBT0304")
+def _lost_at_first(known: Known) -> Iterator[Reading]:
+    unknown = {name for name, value in known.reached.values if value is Truth.UNKNOWN}
+    return _untold(known, unknown - _set_to(known.model, unknown=True))
 
 
-def _only_others(model: md.Model) -> Iterator[Diagnostic]:
-    return (found for found in _never_so(model) if found.code == "BBT0313")
+def _never_known(known: Known, readings: Iterable[Reading]) -> Iterator[Diagnostic]:
+    for reading in readings:
+        name = reading.atom.predicate
+        message = f"no action makes `{name}` known"
+        hint = "it is unknown at some time, and no effect makes it true or false again"
+        yield _about_reading("BBT0304", message, reading, hint, known)
 
 
-def _never_so(model: md.Model) -> Iterator[Diagnostic]:
-    reached = facts.reached(model)
-    lost = _set_to(model, unknown=True)
-    initially = {name for name, value in reached.values if value is Truth.UNKNOWN} - lost
-    unknown = [*_never_known(model, initially)]
-    yield from unknown
-    never_known = {found.related[0].message for found in [*unknown, *_lost_knowledge(model)]}
+def _about_reading(code: str, message: str, reading: Reading, hint: str, known: Known) -> Diagnostic:
+    name = reading.atom.predicate
+    related = (Related(f"`{name}` is declared here", known.model.predicates[name].span),)
+    about = (name, reading.value.word if reading.value else "known")
+    return Diagnostic(code, message, reading.span, hint, related=related, about=about)
+
+
+def _lost_knowledge(known: Known) -> Iterator[Diagnostic]:
+    return _never_known(known, _lost_later(known))
+
+
+def _never_given(known: Known) -> Iterator[tuple[Reading, Truth]]:
+    """The first reading of each value that nothing gives, but for those of which is told that nothing makes
+    them known."""
+    never_known = {each.atom.predicate for each in (*_lost_at_first(known), *_lost_later(known))}
     told: set[tuple[str, Truth]] = set()
-    for formula in facts.all_conditions(model):
-        for reading in facts.readings(formula):
-            name, value = reading.atom.predicate, reading.value
-            related = (Related(f"`{name}` is declared here", model.predicates[name].span),)
-            if (
-                value is not None
-                and (name, value) not in reached.values
-                and (name, value) not in told
-                and (value is Truth.UNKNOWN or related[0].message not in never_known)
-            ):
-                told.add((name, value))
-                if model.predicates[name].external:
-                    message = f"only others can make `{name}` {value.word}"
-                    hint = "plans and figures take it to stay as `:init` says"
-                    yield Diagnostic("BBT0313", message, reading.span, hint, Severity.NOTE, related)
-                    continue
-                message = f"nothing makes `{name}` {value.word}"
-                hint = "`:init` does not give it, and no action that can apply sets it"
-                yield _warning("BBT0304", message, reading.span, hint, related)
+    for reading in known.readings:
+        name, value = reading.atom.predicate, reading.value
+        if value is None or (name, value) in told or (name, value) in known.reached.values:
+            continue
+        if value is Truth.UNKNOWN or name not in never_known:
+            told.add((name, value))
+            yield reading, value
+
+
+def _hopeless_conditions(known: Known) -> Iterator[Diagnostic]:
+    """Readings of values that nothing gives; those of external predicates have a note of their own."""
+    yield from _never_known(known, _lost_at_first(known))
+    for reading, value in _never_given(known):
+        name = reading.atom.predicate
+        if not known.model.predicates[name].external:
+            message = f"nothing makes `{name}` {value.word}"
+            hint = "`:init` does not give it, and no action that can apply sets it"
+            yield _about_reading("BBT0304", message, reading, hint, known)
+
+
+def _only_others(known: Known) -> Iterator[Diagnostic]:
+    for reading, value in _never_given(known):
+        name = reading.atom.predicate
+        if known.model.predicates[name].external:
+            message = f"only others can make `{name}` {value.word}"
+            hint = "plans and figures take it to stay as `:init` says"
+            yield _about_reading("BBT0313", message, reading, hint, known)
 
 
 # --- actions ---------------------------------------------------------------------------------
 
 
-def _unreachable_actions(model: md.Model) -> Iterator[Diagnostic]:
-    reached = facts.reached(model)
-    for name, schema in model.schemas.items():
+def _unreachable_actions(known: Known) -> Iterator[Diagnostic]:
+    reached = known.reached
+    for name, schema in known.model.schemas.items():
         if name not in reached.actions:
             first = _impossible(schema.precondition, reached)
-            if first is not None and any(model.predicates[a.predicate].external for a in mf.atoms(first)):
+            if first is not None and any(
+                known.model.predicates[a.predicate].external for a in mf.atoms(first)
+            ):
                 continue  # of which BBT0313 tells
             related = () if first is None else (Related("this is never true", first.span),)
-            yield _warning("BBT0302", f"action `{name}` can never apply", schema.span, None, related)
+            yield Diagnostic("BBT0302", f"action `{name}` can never apply", schema.span, related=related)
 
 
 def _impossible(formula: mf.Formula, reached: facts.Reached) -> mf.Formula | None:
@@ -236,8 +248,8 @@ def _impossible(formula: mf.Formula, reached: facts.Reached) -> mf.Formula | Non
     return formula
 
 
-def _contradictions(model: md.Model) -> Iterator[Diagnostic]:
-    for schema in model.schemas.values():
+def _contradictions(known: Known) -> Iterator[Diagnostic]:
+    for schema in known.model.schemas.values():
         yield from _contradictions_in(schema.effect, {})
 
 
@@ -250,12 +262,12 @@ def _contradictions_in(
         case me.Set(predicate, args, value, span):
             before = above.setdefault((predicate, args), effect)
             if before.value is not value:
-                yield _warning(
+                yield Diagnostic(
                     "BBT0303",
                     f"one outcome makes `{predicate}` both {before.value.word} and {value.word}",
                     span,
                     f"{max(before.value, value).word} wins",
-                    (Related("the other one", before.span),),
+                    related=(Related("the other one", before.span),),
                 )
         case me.Together(parts):
             certain = sorted(parts, key=lambda part: not isinstance(part, me.Set))
@@ -272,9 +284,9 @@ def _contradictions_in(
             assert_never(effect)
 
 
-def _duplicates(model: md.Model) -> Iterator[Diagnostic]:
+def _duplicates(known: Known) -> Iterator[Diagnostic]:
     seen: dict[tuple[object, ...], md.Schema] = {}
-    for schema in model.schemas.values():
+    for schema in known.model.schemas.values():
         renamed = {parameter.name: f"?{number}" for number, parameter in enumerate(schema.parameters)}
         observe = schema.observe
         if isinstance(observe, me.Choice):
@@ -289,30 +301,29 @@ def _duplicates(model: md.Model) -> Iterator[Diagnostic]:
         )
         before = seen.setdefault(key, schema)
         if before is not schema:
-            yield _warning(
+            yield Diagnostic(
                 "BBT0305",
                 f"action `{schema.name}` does the same as `{before.name}`",
                 schema.span,
-                None,
-                (Related(f"`{before.name}`", before.span),),
+                related=(Related(f"`{before.name}`", before.span),),
             )
 
 
-def _without_effect(model: md.Model) -> Iterator[Diagnostic]:
-    for name, schema in model.schemas.items():
-        if schema.observe is None and next(facts.settings(schema.effect), None) is None:
-            yield _warning("BBT0306", f"action `{name}` changes nothing", schema.span)
+def _without_effect(known: Known) -> Iterator[Diagnostic]:
+    for name, schema in known.model.schemas.items():
+        if schema.observe is None and next(me.settings(schema.effect), None) is None:
+            yield Diagnostic("BBT0306", f"action `{name}` changes nothing", schema.span)
 
 
-def _irrelevant_actions(model: md.Model) -> Iterator[Diagnostic]:
-    if model.goal is None:
+def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
+    if known.model.goal is None:
         return
-    _, actions = facts.relevant(model)
-    possible = facts.reached(model).actions
-    for name, schema in model.schemas.items():
-        changes = next(facts.settings(schema.effect), None) is not None
+    actions = known.relevant
+    possible = known.reached.actions
+    for name, schema in known.model.schemas.items():
+        changes = next(me.settings(schema.effect), None) is not None
         if name not in actions and name in possible and changes:
-            yield _warning(
+            yield Diagnostic(
                 "BBT0307",
                 f"action `{name}` cannot matter to the goal",
                 schema.span,
@@ -323,8 +334,8 @@ def _irrelevant_actions(model: md.Model) -> Iterator[Diagnostic]:
 # --- probabilities, parameters, templates ----------------------------------------------------
 
 
-def _probabilities(model: md.Model) -> Iterator[Diagnostic]:
-    for schema in model.schemas.values():
+def _probabilities(known: Known) -> Iterator[Diagnostic]:
+    for schema in known.model.schemas.values():
         yield from _probabilities_in(schema.effect)
 
 
@@ -341,18 +352,18 @@ def _probabilities_in(effect: me.Effect) -> Iterator[Diagnostic]:
                 rest = branch.span == span and branch.effect == me.NOTHING
                 before = branch if rest else seen.setdefault(branch.effect, branch)
                 if before is not branch and before.probability != 0:
-                    yield _warning(
+                    yield Diagnostic(
                         "BBT0308",
                         "two outcomes of one choice are the same",
                         branch.span,
                         "write it once, with the sum of the probabilities",
-                        (Related("the other one", before.span),),
+                        related=(Related("the other one", before.span),),
                     )
                 if branch.probability == 0:
-                    yield _warning("BBT0308", "this outcome has probability 0", branch.span)
+                    yield Diagnostic("BBT0308", "this outcome has probability 0", branch.span)
                 elif rest and branch.probability <= _SHORTFALL:
                     total = float(1 - branch.probability)
-                    yield _warning(
+                    yield Diagnostic(
                         "BBT0308",
                         f"the probabilities sum to {total:.9g}, just short of 1",
                         span,
@@ -365,12 +376,12 @@ def _probabilities_in(effect: me.Effect) -> Iterator[Diagnostic]:
             assert_never(effect)
 
 
-def _unused_parameters(model: md.Model) -> Iterator[Diagnostic]:
-    for schema in model.schemas.values():
+def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
+    for schema in known.model.schemas.values():
         marked = [(p, replace(p, name=f"{p.name} ")) for p in schema.parameters]
         for parameter, other in marked:
             if not _occurs(schema, parameter, other):
-                yield _warning(
+                yield Diagnostic(
                     "BBT0309",
                     f"action `{schema.name}` never uses its parameter `{parameter.name}`",
                     parameter.span,
@@ -393,11 +404,11 @@ def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
     )
 
 
-def _unused_templates(model: md.Model) -> Iterator[Diagnostic]:
-    called = {call.name for template in model.templates.values() for call in calls(template.body)}
-    for name, template in model.templates.items():
+def _unused_templates(known: Known) -> Iterator[Diagnostic]:
+    called = {call.name for template in known.model.templates.values() for call in md.calls(template.body)}
+    for name, template in known.model.templates.items():
         if template.effect is None and name not in called:
-            yield _warning(
+            yield Diagnostic(
                 "BBT0310",
                 f"template `{name}` is never used",
                 template.span,
@@ -421,6 +432,6 @@ CHECKS = (
     Check("BBT0308", _probabilities),
     Check("BBT0309", _unused_parameters),
     Check("BBT0310", _unused_templates),
-    Check("BBT0311", missing),
-    Check("BBT0311", unneeded, needs_problem=True),
+    Check("BBT0311", lambda known: missing(known.model)),
+    Check("BBT0311", lambda known: unneeded(known.model), needs_problem=True),
 )

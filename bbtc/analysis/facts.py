@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from itertools import islice
 
 from typing_extensions import assert_never
 
-from bbtc.analysis.bodies import calls
 from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
@@ -115,23 +114,12 @@ def all_conditions(model: md.Model) -> Iterator[mf.Formula]:
         yield model.goal
 
 
-def settings(effect: me.Effect) -> Iterator[me.Set]:
-    """Every setting an effect may make."""
-    return (leaf for leaf in me.leaves(effect) if isinstance(leaf, me.Set))
-
-
-def set_values(model: md.Model, predicate: str) -> set[Truth]:
-    """The values that actions may give atoms of the predicate."""
-    leaves = (leaf for schema in model.schemas.values() for leaf in settings(schema.effect))
-    return {leaf.value for leaf in leaves if leaf.predicate == predicate}
-
-
 def observed(schema: md.Schema) -> set[str]:
     """Predicates that ``:observe`` makes known."""
     if schema.observe is None:
         return set()
     if isinstance(schema.observe, me.Choice):
-        return {leaf.predicate for leaf in settings(schema.observe)}
+        return {leaf.predicate for leaf in me.settings(schema.observe)}
     return {atom.predicate for atom in mf.atoms(schema.observe)}
 
 
@@ -164,6 +152,33 @@ class Reached:
                 assert_never(formula)
 
 
+@dataclass(eq=False)
+class Known:
+    """A model, and what is found out about it: once, at first use."""
+
+    model: md.Model
+
+    @cached_property
+    def conditions(self) -> tuple[mf.Formula, ...]:
+        """Every condition."""
+        return tuple(all_conditions(self.model))
+
+    @cached_property
+    def readings(self) -> tuple[Reading, ...]:
+        """Every atom in them."""
+        return tuple(reading for formula in self.conditions for reading in readings(formula))
+
+    @cached_property
+    def reached(self) -> Reached:
+        """What can be so, and what can happen, in a model with a problem."""
+        return reached(self.model)
+
+    @cached_property
+    def relevant(self) -> set[str]:
+        """The actions that can matter to the goal."""
+        return relevant(self.model)
+
+
 def reached(model: md.Model) -> Reached:
     """Predicate-level reachability from the initial state of a model with a problem."""
     result = Reached()
@@ -172,7 +187,7 @@ def reached(model: md.Model) -> Reached:
         given.setdefault(fact.predicate, set()).add(fact.value)
         result.values[fact.predicate, fact.value] = None
     for choice in model.init.choices:
-        for leaf in settings(choice):
+        for leaf in me.settings(choice):
             result.values[leaf.predicate, leaf.value] = None
             if isinstance(choice, me.Choice) and choice.oneof:
                 # Nobody knows which of them it is.
@@ -269,8 +284,9 @@ def _apply(effect: me.Effect, result: Reached) -> None:
             assert_never(effect)
 
 
-def relevant(model: md.Model) -> tuple[set[str], set[str]]:
-    """Predicates and actions that can matter to the goal, to a reward metric or to a template."""
+def relevant(model: md.Model) -> set[str]:
+    """The actions that can matter to the goal, to a reward metric or to a template, as predicates tell.
+    Grounding knows atoms, and finds more (:mod:`bbtc.ground.relevance`, :mod:`bbtc.ground.prune`)."""
     predicates: set[str] = set()
     actions: set[str] = set()
     todo: list[str] = []
@@ -290,13 +306,13 @@ def relevant(model: md.Model) -> tuple[set[str], set[str]]:
         read([model.goal])
     for template in model.templates.values():
         read(template_conditions(template))
-        for call in calls(template.body):
+        for call in md.calls(template.body):
             if call.kind == "action":
                 act(call.name)
     for sensor in model.sensors:
         read([sensor.condition, sensor.sensed])
     for name, schema in model.schemas.items():
-        if schema.observe is not None or (model.metric == "reward" and _rewards(schema)):
+        if schema.observe is not None or (model.metric == "reward" and me.earns(schema.effect)):
             act(name)
     setters, rules = _setters(model)
     while todo:
@@ -304,18 +320,14 @@ def relevant(model: md.Model) -> tuple[set[str], set[str]]:
         read([rule.condition for rule in rules.get(predicate, ())])
         for name in setters.get(predicate, ()):
             act(name)
-    return predicates, actions
-
-
-def _rewards(schema: md.Schema) -> bool:
-    return any(isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect))
+    return actions
 
 
 def _setters(model: md.Model) -> tuple[dict[str, list[str]], dict[str, list[md.Rule]]]:
     """By predicate: the actions that set it, and the rules that derive it."""
     setters: dict[str, list[str]] = {}
     for name, schema in model.schemas.items():
-        for predicate in {leaf.predicate for leaf in settings(schema.effect)}:
+        for predicate in {leaf.predicate for leaf in me.settings(schema.effect)}:
             setters.setdefault(predicate, []).append(name)
     rules: dict[str, list[md.Rule]] = {}
     for rule in model.rules:

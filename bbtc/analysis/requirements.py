@@ -98,7 +98,7 @@ def missing(model: md.Model) -> Iterator[Diagnostic]:
         feature = _FEATURES.get(key)
         if feature is not None and model.requirements.keys().isdisjoint((key, *feature.within)):
             message = f"{feature.what} needs the requirement `{key}`, which `:requirements` does not list"
-            yield Diagnostic(_CODE, message, span or model.span, f"add `{key}`", Severity.WARNING)
+            yield Diagnostic(_CODE, message, span or model.span, f"add `{key}`")
 
 
 def unneeded(model: md.Model) -> Iterator[Diagnostic]:
@@ -110,7 +110,7 @@ def unneeded(model: md.Model) -> Iterator[Diagnostic]:
     for key, span in model.requirements.items():
         if key in _SEPARABLE and key not in fulfilled:
             message = f"`{key}` is required, but nothing here needs it"
-            yield Diagnostic(_CODE, message, span, f"{_FEATURES[key].what} would", Severity.WARNING)
+            yield Diagnostic(_CODE, message, span, f"{_FEATURES[key].what} would")
 
 
 _Use = tuple[str, "Span | None"]

@@ -27,7 +27,7 @@ def hopeless(model: md.Model) -> Iterator[Diagnostic]:
             shown = "" if span is None else f" `{' '.join(span.text.split())[:_LONGEST]}`"
             message = f"nothing can make the goal{shown} true"
             hint = "`:init` does not give it, and no action that can apply brings it about"
-            yield Diagnostic("BBT0316", message, span, hint, Severity.WARNING)
+            yield Diagnostic("BBT0316", message, span, hint)
 
 
 def not_unknown(model: md.Model) -> Iterator[Diagnostic]:
@@ -37,7 +37,7 @@ def not_unknown(model: md.Model) -> Iterator[Diagnostic]:
     if model.goal is None:
         return
     mentioned = {(fact.predicate, fact.args) for fact in model.init.facts}
-    drawn = {leaf.predicate for choice in model.init.choices for leaf in facts.settings(choice)}
+    drawn = {leaf.predicate for choice in model.init.choices for leaf in me.settings(choice)}
     drawn |= {atom.predicate for clause in model.init.clauses for atom in mf.atoms(clause.condition)}
     wanted = [
         reading.atom
@@ -56,7 +56,8 @@ def not_unknown(model: md.Model) -> Iterator[Diagnostic]:
     names = " or ".join(f"`{atom.predicate}({','.join(atom.args)})`" for atom in found[:_MOST_NAMED])
     more = f" or {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
     texts = " ".join(f"(unknown ({' '.join((atom.predicate, *atom.args))}))" for atom in found[:_MOST_NAMED])
-    never = all(Truth.UNKNOWN not in facts.set_values(model, atom.predicate) for atom in found)
+    given = md.set_values(model)
+    never = all(Truth.UNKNOWN not in given.get(atom.predicate, ()) for atom in found)
     yield Diagnostic(
         "BBT0315",
         f"nothing makes {names}{more} unknown{'' if never else ' at the start'}, but only observing tells",
@@ -72,7 +73,7 @@ def _is_only_observed(model: md.Model, predicate: str) -> bool:
         schema
         for schema in model.schemas.values()
         if any(
-            leaf.predicate == predicate and leaf.value is Truth.TRUE for leaf in facts.settings(schema.effect)
+            leaf.predicate == predicate and leaf.value is Truth.TRUE for leaf in me.settings(schema.effect)
         )
     ]
     conditions = [formula for schema in model.schemas.values() for formula in facts.schema_conditions(schema)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Literal
 
 from bbtc.analysis.names import Names
-from bbtc.diagnostics import Diagnostic, Severity
+from bbtc.diagnostics import Diagnostic
 from bbtc.kleene import Truth
 from bbtc.syntax import ast
 from bbtc.syntax.words import TEST_WORDS
@@ -35,7 +35,7 @@ def tested(names: Names, node: ast.Atom) -> ast.Test | None:
     hint = f"the test of a fact is `({key} ({argument.text}))`"
     if argument.key in names.objects:
         message = f"`({key} {argument.text})` is read as a fact of the predicate `{key}`"
-        names.report.add(Diagnostic("BBT0227", message, node.span, hint, Severity.NOTE))
+        names.report.add(Diagnostic("BBT0227", message, node.span, hint))
         return None
     meant = f"`{key}` is a predicate here; {hint}"
     names.unknown("BBT0203", "object", argument, names.objects, meant)

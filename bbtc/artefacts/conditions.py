@@ -34,7 +34,7 @@ def _parts(condition: Condition) -> tuple[Condition, ...]:
 
 def condition_from_json(at: At, index: Mapping[str, int], depth: int = 0) -> Condition:
     """Inverse of :func:`condition_to_json`; ``index`` numbers the variables by name. Raises
-    :class:`~bbtc.artefacts.cursor.Fault`."""
+    :class:`~bbtc.diagnostics.Unreadable`."""
     if depth > MAX_DEPTH:
         raise at.fault("BBT0605", f"a condition has at most {MAX_DEPTH} levels")
     elements = at.elements()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from fractions import Fraction
 from functools import partial
@@ -12,7 +12,7 @@ from typing import TypeAlias, TypeVar
 
 from bbtc.artefacts.jsontext import Path, locate, path_text
 from bbtc.artefacts.numbers import MAX_LENGTH, parse_number
-from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.diagnostics import BbtcError, Diagnostic, Unreadable
 from bbtc.printable import printable
 from bbtc.rounding import too_long
 from bbtc.source import SourceFile, Span
@@ -27,22 +27,11 @@ _PRIVATE = "x-"
 _LONGEST_SHOWN = 60
 
 
-class Fault(Exception):
-    """What is wrong with the value at a path."""
-
-    def __init__(self, code: str, path: Path, message: str, hint: str | None = None) -> None:
-        self.code = code
-        self.path = path
-        self.message = message
-        self.hint = hint
-        super().__init__(message)
+Locate: TypeAlias = Callable[[Sequence[Diagnostic]], Sequence["Span | None"]]
+"""Finds the places that paths lead to."""
 
 
-Locate: TypeAlias = Callable[[Sequence[Fault]], Sequence["Span | None"]]
-"""Finds the places of faults."""
-
-
-def _places(source: SourceFile, faults: Sequence[Fault]) -> list[Span | None]:
+def _places(source: SourceFile, faults: Sequence[Diagnostic]) -> list[Span | None]:
     spans = locate(source, [fault.path for fault in faults])
     return [spans.get(fault.path) for fault in faults]
 
@@ -55,23 +44,23 @@ class Stop(Exception):
 class Faults:
     """Collects the faults of an artefact, so that one run reports them all."""
 
-    _found: list[Fault] = field(default_factory=list)
+    _found: list[Diagnostic] = field(default_factory=list)
 
     def attempt(self, read: Callable[[], _T], default: _T) -> _T:
         """The result of ``read``; if it raises a fault, that goes on record and the default
         stands in, so that reading goes on."""
         try:
             return read()
-        except Fault as fault:
-            self.add(fault)
+        except Unreadable as fault:
+            self.add(fault.diagnostic)
             return default
 
     def require(self, read: Callable[[], _T]) -> _T:
         """The result of ``read``; if it raises a fault, that goes on record and reading stops."""
         try:
             return read()
-        except Fault as fault:
-            self.add(fault)
+        except Unreadable as fault:
+            self.add(fault.diagnostic)
             raise Stop from None
 
     def each(self, items: Sequence[At], read: Callable[[At], _T]) -> list[_T]:
@@ -80,11 +69,11 @@ class Faults:
         for item in items:
             try:
                 results.append(read(item))
-            except Fault as fault:
-                self.add(fault)
+            except Unreadable as fault:
+                self.add(fault.diagnostic)
         return results
 
-    def add(self, fault: Fault) -> None:
+    def add(self, fault: Diagnostic) -> None:
         """Put a fault on record; raises :class:`Stop` when there are very many."""
         self._found.append(fault)
         if len(self._found) >= _MOST_FAULTS:
@@ -99,7 +88,7 @@ class Faults:
         """The faults as diagnostics, with places if these are known."""
         spans = places(self._found) if places else [None] * len(self._found)
         return BbtcError(
-            Diagnostic(fault.code, f"at {path_text(fault.path)}: {fault.message}", span, fault.hint)
+            replace(fault, message=f"at {path_text(fault.path)}: {fault.message}", span=span, path=())
             for fault, span in zip(self._found, spans, strict=True)
         )
 
@@ -121,14 +110,18 @@ def run_reader(read: Callable[[Faults], _T], source: SourceFile | None, places: 
 @dataclass(frozen=True, slots=True)
 class At:
     """A JSON value and its path. The methods return it as what it should be, or raise
-    :class:`Fault`."""
+    :class:`~bbtc.diagnostics.Unreadable`."""
 
     value: object
     path: Path = ()
 
-    def fault(self, code: str, message: str, hint: str | None = None) -> Fault:
-        """A fault at this place."""
-        return Fault(code, self.path, message, hint)
+    def found(self, code: str, message: str, hint: str | None = None) -> Diagnostic:
+        """What is wrong at this place."""
+        return Diagnostic(code, message, hint=hint, path=self.path)
+
+    def fault(self, code: str, message: str, hint: str | None = None) -> Unreadable:
+        """The same, to be raised."""
+        return Unreadable(self.found(code, message, hint))
 
     def members(self, required: Sequence[str], optional: Sequence[str] = ()) -> dict[str, At]:
         """The members of an object. Those whose name starts with ``x-`` are anyone's and ignored."""
@@ -224,7 +217,7 @@ class At:
             raise self.fault("BBT0604", f"a probability is {low} 1, not {clip(self.string())}")
         return value
 
-    def _wrong(self, expected: str) -> Fault:
+    def _wrong(self, expected: str) -> Unreadable:
         return self.fault("BBT0604", f"must be {expected}, not {_kind(self.value)}")
 
 

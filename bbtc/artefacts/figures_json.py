@@ -11,7 +11,7 @@ from bbtc.artefacts.numbers import figure_text
 from bbtc.belief.scenarios import Sampling, Scenario
 from bbtc.belief.simulate import Figures
 from bbtc.belief.state import Values
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.kleene import Truth
 from bbtc.planner.failing_runs import FailingRun
 from bbtc.tree.nodes import Tree
@@ -111,12 +111,12 @@ def failing_run_to_json(tree: Tree, failing: FailingRun) -> dict[str, Any]:
     }
 
 
-def _ending(status: Status) -> str:
-    return "blocked" if status is Status.RUNNING else status.word
+def _ending(status: NodeStatus) -> str:
+    return "blocked" if status is NodeStatus.RUNNING else status.word
 
 
-def _truth(status: Status) -> str:
-    return "unknown" if status is Status.RUNNING else "false"
+def _truth(status: NodeStatus) -> str:
+    return "unknown" if status is NodeStatus.RUNNING else "false"
 
 
 def _figure(value: Fraction | None) -> str | None:

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.printable import escaped
 from bbtc.source import SourceFile, Span
 
 Path: TypeAlias = tuple[str | int, ...]
 """Member names and element numbers from the top of a JSON text down to one value."""
 
-_UNSEEN = re.compile("[\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
 _INDENT = "  "
 _LONGEST_INTEGER = 18
 
@@ -65,12 +65,6 @@ def dumps(value: object) -> str:
             out.append(json.dumps(part, ensure_ascii=False))
     out.append("\n")
     return escaped("".join(out))
-
-
-def escaped(text: str) -> str:
-    """A JSON text with escapes for the characters in its strings that would steer a terminal, or change the
-    direction of what is shown."""
-    return _UNSEEN.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def _members(value: Mapping[str, object], indent: str) -> Iterator[tuple[str, object]]:

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
 from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of
-from bbtc.artefacts.cursor import At, Fault, Faults, clip, run_reader
+from bbtc.artefacts.cursor import At, Faults, clip, run_reader
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
-from bbtc.diagnostics import BbtcError
+from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
 from bbtc.ground.task import (
     Body,
@@ -41,7 +41,7 @@ from bbtc.ground.task import (
 )
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile
-from bbtc.tree.validate import MAX_DEPTH, Problem, active_templates, body_problems
+from bbtc.tree.validate import MAX_DEPTH, active_templates, body_problems
 
 FORMAT = "bbtc-task"
 VERSION = 1
@@ -440,18 +440,18 @@ def _check_templates(members: Mapping[str, At], task: Task, faults: Faults) -> N
         active = active_templates(task.template_by_name)
     except BbtcError as error:
         for found in error.diagnostics:
-            faults.add(members["templates"].fault(found.code, found.message))
+            faults.add(members["templates"].found(found.code, found.message))
         return
     for element in members["templates"].elements():
         parts = dict(element.entries())
         for problem in body_problems(task, task.template_by_name[parts["name"].string()], active):
-            faults.add(problem_fault(problem, parts["body"].path))
+            faults.add(at_node(problem, parts["body"].path))
 
 
-def problem_fault(problem: Problem, root: Path) -> Fault:
-    """A broken rule of a tree or body as a fault at its node in JSON."""
+def at_node(problem: Diagnostic, root: Path) -> Diagnostic:
+    """A broken rule of a tree or body with the path to its node in JSON."""
     steps = (step for number in problem.path for step in ("children", number))
-    return Fault(problem.code, (*root, *steps), problem.message, problem.hint)
+    return replace(problem, path=(*root, *steps))
 
 
 def kind_at(at: At, *kinds: str) -> str:

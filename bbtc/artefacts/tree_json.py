@@ -14,17 +14,18 @@ from typing import get_args
 from typing_extensions import assert_never
 
 from bbtc.artefacts.conditions import condition_from_json, condition_to_json
-from bbtc.artefacts.cursor import At, Fault, Faults, run_reader
+from bbtc.artefacts.cursor import At, Faults, run_reader
 from bbtc.artefacts.numbers import figure_text, given_text
 from bbtc.artefacts.task_json import (
     Json,
+    at_node,
     check_header,
     children_at,
     kind_at,
-    problem_fault,
     read_task,
     task_to_json,
 )
+from bbtc.diagnostics import Unreadable
 from bbtc.ground.condition import TRUE
 from bbtc.ground.task import Task
 from bbtc.source import SourceFile
@@ -34,7 +35,7 @@ from bbtc.tree.nodes import (
     ControlKind,
     ControlNode,
     Node,
-    Status,
+    PlanStatus,
     Tree,
     actions_of,
 )
@@ -44,7 +45,7 @@ FORMAT = "bbtc-tree"
 VERSION = 1
 
 _CONTROLS: Mapping[str, ControlKind] = {kind: kind for kind in get_args(ControlKind)}
-_STATUSES: Mapping[str, Status] = {status: status for status in get_args(Status)}
+_STATUSES: Mapping[str, PlanStatus] = {status: status for status in get_args(PlanStatus)}
 _LABELS = ("name", "template", "reason")
 _BOUNDS = ("lower", "upper")
 
@@ -135,10 +136,10 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
     )
     for field, expected in (("domain", task.domain), ("problem", task.problem)):
         if faults.attempt(members[field].string, expected) != expected:
-            faults.add(members[field].fault("BBT0604", f"the tree's task is of the {field} '{expected}'"))
+            faults.add(members[field].found("BBT0604", f"the tree's task is of the {field} '{expected}'"))
     faults.stop_if_any()
     for problem in tree_problems(tree):
-        faults.add(problem_fault(problem, members["root"].path))
+        faults.add(at_node(problem, members["root"].path))
     return tree
 
 
@@ -162,8 +163,8 @@ class _Reader:
             if kind in _CONTROLS:
                 return self._control(at, level, _CONTROLS[kind])
             return self._action(at) if kind == "action" else self._condition(at)
-        except Fault as fault:
-            self.faults.add(fault)
+        except Unreadable as fault:
+            self.faults.add(fault.diagnostic)
             return ConditionNode("", TRUE)
 
     def _control(self, at: At, level: int, kind: ControlKind) -> ControlNode:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bbtc.backends.pytrees.parts import can_be_unknown, is_summary
-from bbtc.diagnostics import Diagnostic, Severity
+from bbtc.diagnostics import Diagnostic
 
 BESIDE = ".new"
 """What the name of a file that is filled in gets for what it would be now."""
@@ -38,7 +38,7 @@ def place_of(path: str, old: bytes | None, new: bytes, *, shown: str = "", check
     hint = f"{name}{BESIDE} is how it would begin now: take over what you need, and delete it"
     if check:
         hint = f"without --check, {name}{BESIDE} is made: how it would begin now"
-    warning = Diagnostic("BBT1012", message, hint=hint, severity=Severity.WARNING)
+    warning = Diagnostic("BBT1012", message, hint=hint)
     return Place(None if check else path + BESIDE, warning)
 
 

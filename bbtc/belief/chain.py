@@ -11,7 +11,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
-from bbtc.belief.tick import STARTED, Status, compile_tick, memory_of
+from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, Node, actions_of
@@ -21,7 +21,7 @@ class Edge(NamedTuple):
     """A possible result of a state's action, and the index of the state it leads to."""
 
     result: Result
-    target: int
+    successor: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Chain:
 
     actions: tuple[ActionNode, ...]
     states: tuple[State, ...]
-    status: tuple[Status, ...]
+    status: tuple[NodeStatus, ...]
     action: tuple[int, ...]
     edges: tuple[tuple[Edge, ...], ...]
     initial: tuple[tuple[Fraction, int], ...]
@@ -72,20 +72,20 @@ def explore(
         return known
 
     initial = tuple((p, number(State(values, 0))) for values, p in initial_belief(task).items())
-    status: list[Status] = []
+    status: list[NodeStatus] = []
     started: list[int] = []
     edges: list[tuple[Edge, ...]] = []
     for state in states:  # grows while it is read: breadth first
         limits.check_states(len(states), "the simulation")
         returned = tick(state.values, state.finished)
         if returned < STARTED:
-            status.append(Status(returned))
+            status.append(NodeStatus(returned))
             started.append(-1)
             edges.append(())
             continue
         action = returned - STARTED
         finished = state.finished + on_start[action]  # a latched node that starts has not finished
-        status.append(Status.RUNNING)
+        status.append(NodeStatus.RUNNING)
         started.append(action)
         edges.append(tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values)))
     return Chain(actions, tuple(states), tuple(status), tuple(started), tuple(edges), initial)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from bbtc.belief.state import State
-from bbtc.belief.tick import Status, compile_tick, memory_of
+from bbtc.belief.tick import NodeStatus, compile_tick, memory_of
 from bbtc.ground.condition import Condition, conjuncts, evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -18,7 +18,7 @@ class Failing(NamedTuple):
 
     node: str
     condition: Condition
-    status: Status
+    status: NodeStatus
     depth: int
 
 
@@ -28,7 +28,7 @@ class Stop(NamedTuple):
 
     node: str | None
     condition: Condition | None
-    status: Status | None
+    status: NodeStatus | None
 
 
 class FailureFinder:
@@ -40,10 +40,10 @@ class FailureFinder:
         self._task = task
         self._tick = compile_tick(task, root, self._observe)
         counters = memory_of(root).counters
-        self._counters = {node.id: counters[i] for i, node in enumerate(actions_of(root)) if counters[i]}
+        self._counters = {node.id: counters[i] for i, node in enumerate(actions_of(root))}
 
     def _observe(self, node: Node, status: int) -> None:
-        if not isinstance(node, ControlNode) and status < Status.SUCCESS:
+        if not isinstance(node, ControlNode) and status < NodeStatus.SUCCESS:
             self._seen.append((node, status))
 
     def failing(self, state: State) -> list[Failing]:
@@ -56,7 +56,7 @@ class FailureFinder:
         self._seen.clear()
         root = self._tick(state.values, state.finished)
         found = [
-            Failing(node.id, self._condition(node, state), Status(status), self._depth[node.id])
+            Failing(node.id, self._condition(node, state), NodeStatus(status), self._depth[node.id])
             for node, status in reversed(self._seen)
             if isinstance(node, ConditionNode) or self._lacks_precondition(node, state)
         ]
@@ -79,11 +79,11 @@ class FailureFinder:
         self._seen.clear()
         self._tick(state.values, state.finished)
         for node, status in self._seen:
-            if not isinstance(node, ActionNode) or status != Status.FAILURE:
+            if not isinstance(node, ActionNode) or status != NodeStatus.FAILURE:
                 continue
             if self._lacks_precondition(node, state):
                 continue
-            for counter in self._counters.get(node.id, ()):
+            for counter in self._counters[node.id]:
                 if counter.used_up(state.finished):
                     return counter.node
         return None

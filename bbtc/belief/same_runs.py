@@ -30,7 +30,7 @@ def same_runs(task: Task, chain: Chain, other: Node) -> bool:
         if chain.action[state] < 0 or chain.actions[chain.action[state]].action != names[started]:
             return False
         for edge in chain.edges[state]:
-            pair = (edge.target, memory + on_start[started])
+            pair = (edge.successor, memory + on_start[started])
             if pair not in pairs:
                 pairs[pair] = None
                 waiting.append(pair)

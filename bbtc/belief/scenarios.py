@@ -11,7 +11,7 @@ from fractions import Fraction
 
 from bbtc.belief.chain import Chain
 from bbtc.belief.state import Values
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode
 
@@ -31,7 +31,7 @@ class Scenario:
     probability: Fraction
     initial: Values
     steps: tuple[ScenarioStep, ...]
-    status: Status
+    status: NodeStatus
     end: int
     """The state of the chain that it ends in."""
 
@@ -57,7 +57,7 @@ def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterato
     time: of an action that nearly always fails and is tried again, each run is nearly as probable as the
     one before.
     """
-    ends = [end for end in chain.final if not failing or chain.status[end] is not Status.SUCCESS]
+    ends = [end for end in chain.final if not failing or chain.status[end] is not NodeStatus.SUCCESS]
     best = _best_ends(chain, ends, limits) if failing else dict.fromkeys(_ending(chain, ends), Fraction(1))
     # By the best that a beginning may still become; of all runs, by what it is: each soon comes to an end.
     queue: list[tuple[Fraction, int, Fraction, _Path]] = []
@@ -75,17 +75,17 @@ def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterato
         _, _, reached, path = heapq.heappop(queue)
         if not chain.edges[path[0]]:
             yield _scenario(chain, reached, path)
-        for target, probability in _merged(chain, path[0]).items():
-            if target in best:
+        for successor, probability in _merged(chain, path[0]).items():
+            if successor in best:
                 now = reached * probability
-                heapq.heappush(queue, (-now * best[target], next(order), now, (target, path)))
+                heapq.heappush(queue, (-now * best[successor], next(order), now, (successor, path)))
 
 
 def _merged(chain: Chain, state: int) -> dict[int, Fraction]:
     """Where a step leads: results that differ in cost or reward only are one."""
     merged: dict[int, Fraction] = {}
     for edge in chain.edges[state]:
-        merged[edge.target] = merged.get(edge.target, Fraction(0)) + edge.result.probability
+        merged[edge.successor] = merged.get(edge.successor, Fraction(0)) + edge.result.probability
     return merged
 
 
@@ -94,8 +94,8 @@ def _best_ends(chain: Chain, ends: Sequence[int], limits: Limits) -> dict[int, F
     from the ends back)."""
     before: list[list[tuple[int, Fraction]]] = [[] for _ in chain.states]
     for state in range(len(chain.states)):
-        for target, probability in _merged(chain, state).items():
-            before[target].append((state, probability))
+        for successor, probability in _merged(chain, state).items():
+            before[successor].append((state, probability))
     best: dict[int, Fraction] = {}
     queue = [(Fraction(-1), end) for end in ends]
     heapq.heapify(queue)
@@ -117,7 +117,7 @@ def _ending(chain: Chain, ends: Sequence[int]) -> set[int]:
     before: list[list[int]] = [[] for _ in chain.states]
     for state, edges in enumerate(chain.edges):
         for edge in edges:
-            before[edge.target].append(state)
+            before[edge.successor].append(state)
     ending = set(ends)
     waiting = list(ending)
     while waiting:
@@ -164,7 +164,7 @@ def sample(chain: Chain, samples: int, seed: int, limits: Limits, max_steps: int
     generator = random.Random(seed)
     successes = cut = 0
     starts = _cumulative(chain.initial)
-    moves = [_cumulative([(e.result.probability, e.target) for e in edges]) for edges in chain.edges]
+    moves = [_cumulative([(e.result.probability, e.successor) for e in edges]) for edges in chain.edges]
     for _ in range(samples):
         limits.check_time("sampling")
         state = _draw(generator, starts)
@@ -172,7 +172,7 @@ def sample(chain: Chain, samples: int, seed: int, limits: Limits, max_steps: int
             if step % 1024 == 1023:
                 limits.check_time("sampling")
             if not moves[state]:
-                successes += chain.status[state] is Status.SUCCESS
+                successes += chain.status[state] is NodeStatus.SUCCESS
                 break
             state = _draw(generator, moves[state])
         else:

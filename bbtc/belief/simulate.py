@@ -8,7 +8,7 @@ from fractions import Fraction
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import FailureFinder
-from bbtc.belief.tick import Status, compile_tick
+from bbtc.belief.tick import NodeStatus, compile_tick
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -26,7 +26,7 @@ class FailureShare:
 
     node: str
     condition: Condition | None
-    status: Status
+    status: NodeStatus
     probability: Fraction
 
 
@@ -57,7 +57,7 @@ def simulate(task: Task, root: Node, limits: Limits) -> Figures:
 def success_of(chain: Chain) -> Fraction:
     """The probability that runs end in success."""
     visits = Absorption(chain).visits()
-    wins = (state for state in chain.final if chain.status[state] is Status.SUCCESS)
+    wins = (state for state in chain.final if chain.status[state] is NodeStatus.SUCCESS)
     return sum((visits[state] or Fraction(0) for state in wins), Fraction(0))
 
 
@@ -66,11 +66,11 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
     absorption = Absorption(chain)
     visits = absorption.visits()
     endless = absorption.entering()
-    mass = {status: Fraction(0) for status in Status}
+    mass = {status: Fraction(0) for status in NodeStatus}
     for state in chain.final:
         mass[chain.status[state]] += visits[state] or 0
-    success = mass[Status.SUCCESS]
-    wins = absorption.hitting({s: Fraction(1) for s in chain.final if chain.status[s] is Status.SUCCESS})
+    success = mass[NodeStatus.SUCCESS]
+    wins = absorption.hitting({s: Fraction(1) for s in chain.final if chain.status[s] is NodeStatus.SUCCESS})
     cost, actions, reward = Fraction(0), Fraction(0), Fraction(0)
     won_cost, won_actions = Fraction(0), Fraction(0)
     for state, edges in enumerate(chain.edges):
@@ -79,7 +79,7 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
             continue
         for edge in edges:
             weight = visit * edge.result.probability
-            won = weight * wins[edge.target]
+            won = weight * wins[edge.successor]
             cost += weight * edge.result.cost
             reward += weight * edge.result.reward
             actions += weight
@@ -87,8 +87,8 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
             won_actions += won
     return Figures(
         success=success,
-        failure=mass[Status.FAILURE],
-        blocked=mass[Status.RUNNING],
+        failure=mass[NodeStatus.FAILURE],
+        blocked=mass[NodeStatus.RUNNING],
         endless=endless,
         failures=_shares(task, root, chain, visits),
         cost=None if endless else cost,
@@ -102,10 +102,10 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
 
 def _shares(task: Task, root: Node, chain: Chain, visits: list[Fraction | None]) -> tuple[FailureShare, ...]:
     finder = FailureFinder(task, root)
-    shares: dict[tuple[str, Condition | None, Status], Fraction] = {}
+    shares: dict[tuple[str, Condition | None, NodeStatus], Fraction] = {}
     for state in chain.final:
         probability = visits[state]
-        if chain.status[state] is Status.SUCCESS or not probability:
+        if chain.status[state] is NodeStatus.SUCCESS or not probability:
             continue
         node, condition, status = finder.stopped(chain.states[state])
         key = (node or root.id, condition, chain.status[state] if status is None else status)

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.ground.condition import evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -26,7 +26,7 @@ def violations(task: Task, chain: Chain) -> list[str]:
                 found[f"{name} is started where its precondition is not true"] = None
     for index in chain.final:
         holds = evaluate(task.goal, chain.states[index].values) is Truth.TRUE
-        if chain.status[index] is Status.SUCCESS and not holds:
+        if chain.status[index] is NodeStatus.SUCCESS and not holds:
             found["the tree succeeds where the goal is not true"] = None
     absorption = Absorption(chain)
     visits = absorption.visits()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 from bbtc.belief.state import State, Transition, Values, compile_action, initial_belief
-from bbtc.belief.tick import STARTED, Status, Tick, compile_tick, memory_of
+from bbtc.belief.tick import STARTED, NodeStatus, Tick, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, Node, actions_of
@@ -29,8 +29,8 @@ class Moment:
     that action, the most probable first; outcomes that differ only in cost are one."""
 
     state: State
-    statuses: dict[str, Status]
-    status: Status
+    statuses: dict[str, NodeStatus]
+    status: NodeStatus
     action: ActionNode | None
     branches: tuple[Branch, ...]
 
@@ -50,7 +50,7 @@ class Stepper:
     limits: Limits = field(default_factory=Limits)
     moments: list[Moment] = field(default_factory=list, init=False)
     _transitions: dict[str, Transition] = field(default_factory=dict, init=False)
-    _statuses: dict[str, Status] = field(default_factory=dict, init=False)
+    _statuses: dict[str, NodeStatus] = field(default_factory=dict, init=False)
     _actions: list[ActionNode] = field(init=False)
     _started: dict[str, int] = field(init=False)
     _returned: Tick = field(init=False)
@@ -106,13 +106,13 @@ class Stepper:
         return len(branches) - 1
 
     def _observe(self, node: Node, returned: int) -> None:
-        self._statuses[node.id] = Status.RUNNING if returned >= STARTED else Status(returned)
+        self._statuses[node.id] = NodeStatus.RUNNING if returned >= STARTED else NodeStatus(returned)
 
     def _tick(self, state: State) -> Moment:
         statuses = self._statuses = {}
         returned = self._returned(state.values, state.finished)
         if returned < STARTED:
-            return Moment(state, statuses, Status(returned), None, ())
+            return Moment(state, statuses, NodeStatus(returned), None, ())
         action = self._actions[returned - STARTED]
         if action.action not in self._transitions:
             ground = self.task.action_by_name[action.action]
@@ -120,7 +120,7 @@ class Stepper:
         merged: dict[Values, Fraction] = {}
         for result in self._transitions[action.action](state.values):
             merged[result.values] = merged.get(result.values, Fraction(0)) + result.probability
-        return Moment(state, statuses, Status.RUNNING, action, _branches(merged))
+        return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(merged))
 
 
 def _branches(belief: dict[Values, Fraction]) -> tuple[Branch, ...]:

@@ -20,8 +20,8 @@ from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, retries_of
 
 
-class Status(enum.IntEnum):
-    """What a node returns. The numbers equal the truth values they stand for."""
+class NodeStatus(enum.IntEnum):
+    """What a node returns; named as in BehaviorTree.CPP. The numbers equal the truth values it means."""
 
     FAILURE = 0
     RUNNING = 1
@@ -124,12 +124,12 @@ def compile_tick(task: Task, root: Node, observe: Observer | None = None) -> Tic
 def _action(index: int, latched: bool, guard: Condition) -> Tick:
     bit, started = (1 << index if latched else 0), STARTED + index
     if guard == TRUE:
-        return lambda _, finished: Status.SUCCESS if finished & bit else started
+        return lambda _, finished: NodeStatus.SUCCESS if finished & bit else started
     test = compile_condition(guard)
 
     def tick(values: Sequence[int], finished: int) -> int:
         if finished & bit:
-            return Status.SUCCESS
+            return NodeStatus.SUCCESS
         holds = test(values)
         return started if holds == Truth.TRUE else holds
 
@@ -143,7 +143,7 @@ def _limited(index: int, action: Tick, counters: tuple[Counter, ...]) -> Tick:
     def tick(values: Sequence[int], finished: int) -> int:
         status = action(values, finished)
         if status == started and any(counter.used_up(finished) for counter in counters):
-            return Status.FAILURE
+            return NodeStatus.FAILURE
         return status
 
     return tick
@@ -155,7 +155,9 @@ def _control(kind: str, children: list[Tick]) -> Tick:
         return child
     # Each kind goes on while the child returns one status (semantics page, table of nodes). A
     # started action is running, but no Skipper goes on after it: only its last child holds actions.
-    go_on = int({"sequence": Status.SUCCESS, "fallback": Status.FAILURE, "skipper": Status.RUNNING}[kind])
+    go_on = int(
+        {"sequence": NodeStatus.SUCCESS, "fallback": NodeStatus.FAILURE, "skipper": NodeStatus.RUNNING}[kind]
+    )
 
     def tick(values: Sequence[int], finished: int) -> int:
         for child in children:

@@ -10,10 +10,11 @@ from bbtc import pipeline
 from bbtc.artefacts import dumps, load_tree, tree_to_json
 from bbtc.artefacts.numbers import exact
 from bbtc.backends.exporter import Begun, Files
-from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report
+from bbtc.diagnostics import BbtcError, Diagnostic, Report
+from bbtc.exit_status import OF_TREE, ExitStatus
 from bbtc.files.read_write import system_trouble
 from bbtc.limits import PLANNING_SECONDS, Limits
-from bbtc.manifest.read import Export, TreeEntry
+from bbtc.manifest.entries import Export, TreeEntry
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.source import SourceFile
@@ -69,7 +70,7 @@ def perform(job: Job) -> Made:
         return _perform(job, report)
     except BbtcError as error:
         found = [*report, *(d for d in error.diagnostics if d not in list(report))]
-        failure: Failure = "limit" if isinstance(error, LimitReached) else "error"
+        failure: Failure = "limit" if error.exit_status is ExitStatus.LIMIT else "error"
         return Made(job.entry.name, diagnostics=tuple(found), failure=failure)
     except Exception as error:  # noqa: BLE001 - a bug met in one tree must not lose the others
         trouble = system_trouble(error)
@@ -100,7 +101,7 @@ def _steps(job: Job, report: Report, watch: Watch, limits: Limits) -> Made:
         plan = _plan(job, report, limits, watch)
         tree = plan.tree
         if tree.success_probability < tree.target:
-            failure: Failure = "error" if tree.status == "out-of-reach" else "limit"
+            failure: Failure = "error" if OF_TREE[tree.status] is ExitStatus.ERRORS else "limit"
             return Made(entry.name, diagnostics=tuple(report), short=_shortfall(plan), failure=failure)
         text = dumps(tree_to_json(tree)).encode()
         steps[TREE] = {entry.file: text}

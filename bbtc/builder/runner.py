@@ -26,17 +26,17 @@ from bbtc.builder.state import (
 )
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.files.folder import Batch
-from bbtc.files.read_write import reason, relative_parts, write
+from bbtc.files.read_write import SameFiles, reason, relative_parts, write
 from bbtc.manifest.find import manifest_bytes, source_name
 
 if TYPE_CHECKING:
     from bbtc.builder.job import Failure, Job, Made
-    from bbtc.manifest.read import Manifest, TreeEntry
+    from bbtc.manifest.entries import Manifest, TreeEntry
 
 _SAVE_EVERY = 1.0
 """Seconds between two savings of the state, which bound what a kill can lose."""
 
-Status: TypeAlias = Literal["unchanged", "built", "failed"]
+BuildStatus: TypeAlias = Literal["unchanged", "built", "failed"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Outcome:
     figures, if it was built."""
 
     name: str
-    status: Status
+    status: BuildStatus
     changed: tuple[str, ...] = ()
     diagnostics: tuple[Diagnostic, ...] = ()
     failure: Failure | None = None
@@ -60,7 +60,7 @@ class BuildReport:
 
     outcomes: tuple[Outcome, ...]
 
-    def count(self, status: Status) -> int:
+    def count(self, status: BuildStatus) -> int:
         """How many trees had this outcome."""
         return sum(outcome.status == status for outcome in self.outcomes)
 
@@ -146,7 +146,7 @@ class _Builder:
         self.state.manifest = manifest_digest
         self.state.trees = {entry.name: self.state.trees.get(entry.name, {}) for entry in manifest.trees}
         entries = {entry.name: entry for entry in _chosen(manifest, names)}
-        require_apart(manifest)
+        _require_apart(manifest)
         outcomes: dict[str, Outcome] = {}
         jobs: list[Job] = []
         for entry in manifest.trees:
@@ -314,24 +314,18 @@ class _Builder:
         self.saved = time.monotonic()
 
 
-def require_apart(manifest: Manifest) -> None:
+def _require_apart(manifest: Manifest) -> None:
     """Raise :class:`BbtcError` where something that is to be made is, by another name, the manifest or an
     input of a tree. (What has the same name is told when the manifest is read.)"""
-    sources = {}
+    sources = SameFiles()
     for path in (manifest.file.name, *(path for entry in manifest.trees for path in entry.inputs)):
-        with contextlib.suppress(OSError, ValueError):
-            status = (manifest.folder / path).stat()
-            sources[status.st_dev, status.st_ino] = path
+        sources.note(str(manifest.folder / path), path)
     found = []
     for entry in manifest.trees:
         for file, span in ((entry.file, entry.span), *((e.file, e.span) for e in entry.exports)):
-            with contextlib.suppress(OSError, ValueError):
-                status = (manifest.folder / file).stat()
-                source = sources.get((status.st_dev, status.st_ino))
-                if source is not None:
-                    found.append(
-                        Diagnostic("BBT1009", f"{file} is the source {source} by another name", span)
-                    )
+            source = sources.find(str(manifest.folder / file))
+            if source is not None:
+                found.append(Diagnostic("BBT1009", f"{file} is the source {source} by another name", span))
     if found:
         raise BbtcError(found)
 

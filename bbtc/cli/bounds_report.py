@@ -6,8 +6,9 @@ import json
 from collections.abc import Sequence
 from fractions import Fraction
 
-from bbtc.artefacts.numbers import figure_text
-from bbtc.cli.wording import at, block_line, counted, exact, oneof_note, steps_of, within
+from bbtc.artefacts.numbers import exact, figure_text
+from bbtc.cli.counting import counted
+from bbtc.cli.wording import at, block_line, oneof_note, steps_of, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.planner.bounds import TaskValue

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from bbtc.artefacts.numbers import exact
 from bbtc.backends.pictures.outline import UNICODE, label, outline
-from bbtc.cli.wording import counted, exact
+from bbtc.cli.counting import counted
 from bbtc.comparison import Comparison, FigureChange
 from bbtc.printable import printable
 from bbtc.rounding import decimal

@@ -1,8 +1,5 @@
 """The program ``bbtc``: from its first moment to its exit status, whatever happens to it.
 
-Exit statuses: 0 done; 1 errors in the input, drift, a target provably out of reach, or a result that cannot
-be written; 2 wrong usage; 3 a limit stopped the work; 70 internal error; 130 interrupted.
-
 This module imports nothing that takes time: until :func:`main` runs, Ctrl-C shows a traceback.
 """
 
@@ -11,11 +8,7 @@ from __future__ import annotations
 import os
 import sys
 
-EXIT_ERRORS = 1
-EXIT_USAGE = 2
-EXIT_LIMIT = 3
-EXIT_INTERNAL = 70
-EXIT_INTERRUPTED = 130
+from bbtc.exit_status import ExitStatus
 
 _INTERRUPTED = "interrupted"
 
@@ -27,9 +20,9 @@ def main() -> None:
         _take_over_streams()
         from bbtc.cli.outcome import run
 
-        status = run()
+        status: int = run()
     except KeyboardInterrupt:
-        status = EXIT_INTERRUPTED
+        status = ExitStatus.INTERRUPTED
         _say(_INTERRUPTED)
     _end(status)
 
@@ -46,7 +39,7 @@ def _take_over_signals() -> None:
 def _leave(_number: int, _frame: object) -> None:
     """Ctrl-C while the program loads: there is nothing to clean up."""
     _say(_INTERRUPTED)
-    os._exit(EXIT_INTERRUPTED)
+    os._exit(ExitStatus.INTERRUPTED)
 
 
 def _unraisable(what: sys.UnraisableHookArgs) -> None:
@@ -96,7 +89,7 @@ def _end(status: int) -> None:
             if stream is sys.stdout and not isinstance(error, BrokenPipeError):
                 _say(f"error[BBT0004]: cannot write the standard output: {error.strerror}")
             if stream is sys.stdout and status == 0:
-                status = EXIT_ERRORS
+                status = ExitStatus.ERRORS
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # the interpreter flushes it again
     # A task may hold millions of objects, among which the interpreter need not look for cycles now.
     gc.freeze()

@@ -9,8 +9,8 @@ import sys
 import click
 
 from bbtc.cli.group import cli
-from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERNAL, EXIT_INTERRUPTED
 from bbtc.cli.output import tell
+from bbtc.exit_status import ExitStatus
 from bbtc.files.read_write import system_trouble
 from bbtc.printable import printable
 from bbtc.watch import process_started
@@ -35,13 +35,13 @@ def run() -> int:
         return error.exit_code
     except click.Abort:
         tell("interrupted")
-        return EXIT_INTERRUPTED
+        return ExitStatus.INTERRUPTED
     except BrokenPipeError:
-        return EXIT_ERRORS  # the reader of our output has gone (`bbtc … | head`): not worth a message
+        return ExitStatus.ERRORS  # the reader of our output has gone (`bbtc … | head`): not worth a message
     except Exception as error:
         if _interrupts:  # while a module of another language loaded, which made something else of it
             tell("interrupted")
-            return EXIT_INTERRUPTED
+            return ExitStatus.INTERRUPTED
         if debug:
             raise
         return _told(error)
@@ -57,10 +57,10 @@ def _told(error: Exception) -> int:
     trouble = system_trouble(error)
     if trouble is not None:
         tell(f"error[BBT0004]: cannot write: {trouble}")
-        return EXIT_ERRORS
+        return ExitStatus.ERRORS
     tell(
         f"internal error: {type(error).__name__}: {printable(str(error))}\n"
         "This is a bug in bbtc, not in your input. Please report it with the input and the output of "
         "the same command with `bbtc --debug`."
     )
-    return EXIT_INTERNAL
+    return ExitStatus.INTERNAL

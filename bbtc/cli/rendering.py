@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from bbtc.artefacts.jsontext import escaped
-from bbtc.codes import CODES
+from bbtc.codes import CODES, Code
 from bbtc.diagnostics import Diagnostic, Severity
-from bbtc.printable import printable_line
+from bbtc.pages import page
+from bbtc.printable import escaped, printable_line
 from bbtc.source import Span
 from bbtc.version import __version__
 
@@ -51,7 +51,7 @@ def _place(span: Span | None) -> dict[str, object]:
 def _as_json(diagnostic: Diagnostic) -> dict[str, object]:
     data: dict[str, object] = {
         "code": diagnostic.code,
-        "title": CODES[diagnostic.code],
+        "title": CODES[diagnostic.code].title,
         "severity": diagnostic.severity.value,
         "message": "\n".join([diagnostic.message, *diagnostic.lines]),
         "hint": diagnostic.hint,
@@ -83,13 +83,24 @@ def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
                     "driver": {
                         "name": "bbtc",
                         "version": __version__,
-                        "rules": [{"id": code, "shortDescription": {"text": CODES[code]}} for code in codes],
+                        "rules": [_sarif_rule(CODES[code]) for code in codes],
                     }
                 },
                 "columnKind": "unicodeCodePoints",
                 "results": [_sarif_result(d, codes.index(d.code)) for d in diagnostics],
             }
         ],
+    }
+
+
+def _sarif_rule(code: Code) -> dict[str, object]:
+    """What is known of a code. Its page is part of it: it can be read where the pages are not at hand."""
+    text = page(code.code)
+    return {
+        "id": code.code,
+        "shortDescription": {"text": code.title},
+        "help": {"text": text, "markdown": text},
+        "defaultConfiguration": {"level": code.severity.value},
     }
 
 
@@ -111,7 +122,7 @@ def _sarif_result(diagnostic: Diagnostic, rule: int) -> dict[str, object]:
 
 def _as_github(diagnostic: Diagnostic) -> str:
     level = {"error": "error", "warning": "warning", "note": "notice"}[diagnostic.severity.value]
-    properties = {"title": f"{diagnostic.code} {CODES[diagnostic.code]}"}
+    properties = {"title": f"{diagnostic.code} {CODES[diagnostic.code].title}"}
     if diagnostic.span:
         region = _region(diagnostic.span)
         properties = {

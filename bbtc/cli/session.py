@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias, TypeVar, cast
 import click
 from click.core import ParameterSource
 
-from bbtc.cli.main import EXIT_ERRORS, EXIT_LIMIT, EXIT_USAGE
 from bbtc.cli.output import ProgressLine, on_terminal, tell
 from bbtc.cli.rendering import render
-from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Report, Severity
+from bbtc.diagnostics import BbtcError, Diagnostic, Report
 from bbtc.files.read_write import Outputs, read_file, reason, require_apart, require_writable
 from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.printable import printable
@@ -143,7 +142,7 @@ class Session:
         if kept and not check:
             message = f"{', '.join(kept)}: yours, and left as it is"
             hint = "to begin it anew, delete it, or write to another place"
-            self.report.add(Diagnostic("BBT1011", message, hint=hint, severity=Severity.NOTE))
+            self.report.add(Diagnostic("BBT1011", message, hint=hint))
         return found
 
     def show(self, diagnostics: Sequence[Diagnostic]) -> None:
@@ -161,18 +160,11 @@ def _rule(output: str, inputs: Sequence[str]) -> bytes:
     return depfile(output, inputs)
 
 
-# What is wrong with the command line itself: a strategy, a format or an option of theirs, an output.
-_WRONG_USAGE = frozenset({"BBT0009", "BBT0501", "BBT0503", "BBT0701", "BBT0704"})
-
-
 def _fail(session: Session, error: BbtcError) -> NoReturn:
     shown = [*session.report]
     shown.extend(d for d in error.diagnostics if d not in shown)
     session.show(shown)
-    if isinstance(error, LimitReached):
-        sys.exit(EXIT_LIMIT)
-    usage = all(each.code in _WRONG_USAGE for each in error.diagnostics)
-    sys.exit(EXIT_USAGE if usage else EXIT_ERRORS)
+    sys.exit(error.exit_status)
 
 
 def command(function: Callable[..., int | None]) -> Callable[..., None]:

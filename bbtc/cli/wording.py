@@ -8,7 +8,7 @@ from fractions import Fraction
 from bbtc.artefacts.numbers import exact
 from bbtc.belief.scenarios import Scenario
 from bbtc.belief.simulate import Figures
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.cli.counting import counted
 from bbtc.ground.condition import Condition
 from bbtc.ground.describe import describe
@@ -20,23 +20,6 @@ from bbtc.planner.why_not import Block
 from bbtc.printable import printable
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree, retries_of, walk
-
-__all__ = [
-    "at",
-    "block_line",
-    "changes",
-    "counted",
-    "exact",
-    "failing_lines",
-    "figures_report",
-    "oneof_note",
-    "plan_summary",
-    "refinement_line",
-    "run_lines",
-    "simplified_line",
-    "steps_of",
-    "within",
-]
 
 _MOST_NAMED = 5  # actions named of many
 _MOST_BLOCKS = 3  # causes told of one run
@@ -64,8 +47,8 @@ def refinement_line(number: int, step: Refinement) -> list[str]:
     else:
         verb = "observe" if step.value is Truth.UNKNOWN else "achieve"
         chances = [f"with probability {exact(step.chance)}"] if step.chance else []
-        if step.open:
-            chances.append(f"to be observed with probability {exact(step.open)}")
+        if step.observable:
+            chances.append(f"to be observed with probability {exact(step.observable)}")
         if step.unmet:
             chances.append(f"after {counted(step.unmet, 'precondition')} not yet met")
         what = f"insert {step.inserted} to {verb} it ({', '.join(chances)})"
@@ -142,16 +125,16 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     return lines
 
 
-def _stopped(tree: Tree, node: str, condition: Condition | None, status: Status) -> str:
+def _stopped(tree: Tree, node: str, condition: Condition | None, status: NodeStatus) -> str:
     """What stopped a run at a node, in words."""
     if condition is not None:
-        word = "unknown" if status is Status.RUNNING else "false"
+        word = "unknown" if status is NodeStatus.RUNNING else "false"
         return f"{describe(tree.task, condition)} is {word}"
     number = {retry.id: attempts for retry, attempts in retries_of(tree.root)}.get(node)
     if number is None:
         return "no condition failed"
     what = "the only attempt used up" if number == 1 else f"all {number} attempts used up"
-    return f"{what} (blocked)" if status is Status.RUNNING else what
+    return f"{what} (blocked)" if status is NodeStatus.RUNNING else what
 
 
 def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> list[str]:
@@ -159,7 +142,7 @@ def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> lis
     lines = ["failing runs, the most probable first:"] if runs else []
     for each in runs:
         status = each.run.status
-        ending = ", blocked" if status is Status.RUNNING else ""
+        ending = ", blocked" if status is NodeStatus.RUNNING else ""
         whys = [block_line(block, " of the tree") for block in each.blocks[:_MOST_BLOCKS]]
         if not whys and each.lost:
             lost = " and ".join(describe(tree.task, part) for part in each.lost)

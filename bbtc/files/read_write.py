@@ -110,31 +110,47 @@ def require_writable(path: str, *, folder: bool = False) -> None:
 def require_apart(outputs: Iterable[str], inputs: Iterable[str]) -> None:
     """Raise :class:`BbtcError` where an output is the file of an input or of another output, by whatever
     name, or belongs to git or to ``bbtc build``."""
-    others = [(name, "the input") for name in inputs if name != "-"]
+    inputs = [name for name in inputs if name != "-"]
+    known = SameFiles()
+    for name in inputs:
+        known.note(name, name)
     for output in outputs:
         if any(part.casefold() in KEPT for part in output.replace(os.sep, "/").split("/")):
             kept = " or ".join(sorted(KEPT))
             raise BbtcError.single("BBT0009", f"cannot write {output}: nothing is written into {kept}")
-        for other, what in others:
-            if same_file(output, other):
-                message = f"cannot write {output}: it is {what}" + (f" {other}" if other != output else "")
-                raise BbtcError.single("BBT0009", message, hint="name another file")
-        others.append((output, "the output"))
+        other = known.find(output)
+        if other is not None:
+            what = "the input" if other in inputs else "the output"
+            message = f"cannot write {output}: it is {what}" + (f" {other}" if other != output else "")
+            raise BbtcError.single("BBT0009", message, hint="name another file")
+        known.note(output, output)
 
 
-def same_file(one: str, other: str) -> bool:
-    """Are two paths the same file, or would they be? Devices and pipes are nobody's."""
-    if "-" in {one, other}:
-        return one == other
+class SameFiles:
+    """Knows paths by the files that they are, or would be. Devices and pipes are nobody's."""
+
+    def __init__(self) -> None:
+        self._names: dict[object, str] = {}
+
+    def note(self, path: str, name: str) -> None:
+        """Keep the name of a path, unless its file has one."""
+        self._names.setdefault(_identity(path), name)
+
+    def find(self, path: str) -> str | None:
+        """The name that was kept for the file of a path."""
+        return self._names.get(_identity(path))
+
+
+def _identity(path: str) -> object:
+    if path == "-":
+        return path
     try:
-        first, second = os.stat(one), os.stat(other)
+        status = os.stat(path)
     except OSError:
-        first_path, second_path = (os.path.realpath(path) for path in (one, other))
-        if first_path == second_path:
-            return True
-        folder = os.path.dirname(first_path)
-        return first_path.casefold() == second_path.casefold() and ignores_case(folder)
-    return os.path.samestat(first, second) and (stat.S_ISREG(first.st_mode) or stat.S_ISDIR(first.st_mode))
+        real = os.path.realpath(path)
+        return real.casefold() if ignores_case(os.path.dirname(real)) else real
+    known = stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)
+    return (status.st_dev, status.st_ino) if known else object()
 
 
 def ignores_case(path: str) -> bool:

@@ -1,4 +1,19 @@
-"""Lifted effects made ground: the factors of an action."""
+"""Lifted effects made ground: the factors of an action.
+
+What stands in a block (:mod:`bbtc.ground.normal`) becomes independent factors by these rules, ``chance``
+being ``probabilistic`` or ``oneof``:
+
+1. ``(forall (?x) (e ?x))`` → ``(and (e a) (e b))``, with all objects of the type of ``?x``
+2. ``(when true e)`` → ``e``, and ``(when false e)`` → ``(and)``
+3. ``(when f (chance p d q e))`` → ``(chance p (when f d) q (when f e))``
+4. ``(and (not p) (unknown p) p)`` → ``p``: what one occurrence sets a variable to is the Kleene maximum
+5. ``(chance p (chance r d s e) q c)`` → ``(chance p·r d p·s e q c)``, if the two chances are of one kind
+   and the inner one is the only one of its branch
+6. ``(chance p e q e)`` → ``(chance p+q e)``
+7. ``(chance 1 e)`` → ``e``
+8. ``(and c (chance p d q e))`` → ``(chance p (and c d) q (and c e))``, if there is no other chance; beside
+   several chances, what is certain is a factor of its own, which stands first
+"""
 
 from __future__ import annotations
 
@@ -50,6 +65,14 @@ class _Part:
         both = before[0] + cost, before[1] + reward
         if any(both):
             self.charges[guard] = both
+
+    def draw(self, factors: Iterable[Factor]) -> None:
+        """Draw further factors; what is certain of them is no draw (rule 7)."""
+        for factor in factors:
+            if len(factor.outcomes) > 1:
+                self.factors.append(factor)
+            else:
+                _absorb(self, factor.outcomes[0])
 
     def outcome(self, probability: Fraction, factors: tuple[Factor, ...]) -> Outcome:
         """All of it as one outcome, with further draws."""
@@ -108,7 +131,7 @@ class _Loop:
         slot, members_of, parts = self._levels[level]
         members = members_of(env)
         self._spend(len(members))
-        for env[slot] in members:
+        for env[slot] in members:  # 1
             conditions = _met(parts, env, above)
             if conditions is not None:
                 yield from self._enter(level + 1, env, conditions)
@@ -128,7 +151,7 @@ def _met(parts: list[Lowered], env: Env, above: list[Condition]) -> list[Conditi
     found = list(above)
     for part in parts:
         condition = part(env)
-        if condition is FALSE:
+        if condition is FALSE:  # 2
             return None
         if condition is not TRUE:
             found.append(condition)
@@ -295,11 +318,7 @@ class LoweredEffect:
                 for leaf in leaves:
                     leaf.run(part, env, guard)
         for chance in self._chances:
-            for factor in chance.factors(env, above):
-                if len(factor.outcomes) > 1:
-                    part.factors.append(factor)
-                else:
-                    _absorb(part, factor.outcomes[0])
+            part.draw(chance.factors(env, above))
         return part
 
 
@@ -367,13 +386,12 @@ class _LoweredChance:
                 yield from branch.charged(env, conditions)
 
     def factors(self, env: Env, above: list[Condition]) -> Iterator[Factor]:
-        """One draw for every binding. A draw nested in a branch as its only one is multiplied in (a
-        sum of outcomes); several, or a mixture of known and unknown probabilities, stay nested."""
+        """One draw for every binding."""
         for conditions in self._loop.guards(env, above):
             outcomes: list[Outcome] = []
             for probability, branch in self._branches:
-                part = branch.part(env, conditions)
-                if len(part.factors) == 1 and part.factors[0].oneof == self._oneof:
+                part = branch.part(env, conditions)  # 3
+                if len(part.factors) == 1 and part.factors[0].oneof == self._oneof:  # 5
                     for inner in part.factors[0].outcomes:
                         joined = _join(part, inner)
                         outcomes.append(replace(joined, probability=joined.probability * probability))
@@ -444,7 +462,7 @@ class _Amounts:
 
 
 def _put(sets: dict[int, Truth], number: int, value: Truth) -> None:
-    """Where one occurrence sets a variable twice, the Kleene maximum wins."""
+    """Set a variable, maybe once more (rule 4)."""
     sets[number] = max(sets.get(number, value), value)
 
 
@@ -460,7 +478,7 @@ def _absorb(part: _Part, outcome: Outcome) -> None:
 
 
 def _join(part: _Part, outcome: Outcome) -> Outcome:
-    """The outcome with everything that is certain beside it."""
+    """The outcome with everything that is certain beside it (rule 8)."""
     sets = {guard: dict(sets) for guard, sets in part.sets.items()}
     both = _Part(sets, part.cost, part.reward, dict(part.charges))
     _absorb(both, outcome)
@@ -473,26 +491,21 @@ def _arranged(part: _Part) -> tuple[Factor, ...]:
         if not part:
             return (only,)
         joined = merge_outcomes(_join(part, outcome) for outcome in only.outcomes)
-        # With what is certain, all branches may come to the same.
+        # With what is certain (rule 8), all branches may come to the same.
         return (Factor(joined, only.oneof),) if len(joined) > 1 else arrange([Factor(joined)])
     own = (Factor((part.outcome(ONE, ()),)),) if part else ()
     return (*own, *part.factors)
 
 
 def arrange(factors: Iterable[Factor]) -> tuple[Factor, ...]:
-    """Factors in canonical form: what is certain joins the outcomes of a single chance, or stands
-    first as a factor of its own; factors that do nothing are gone."""
+    """Factors in canonical form (rules 7 and 8); those that do nothing are gone."""
     part = _Part()
-    for factor in factors:
-        if len(factor.outcomes) > 1:
-            part.factors.append(factor)
-        else:
-            _absorb(part, factor.outcomes[0])
+    part.draw(factors)
     return _arranged(part)
 
 
 def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
-    """Outcomes that do the same made one, with the sum of their probabilities."""
+    """Outcomes that do the same made one, with the sum of their probabilities (rule 6)."""
     merged: dict[tuple[object, ...], Outcome] = {}
     for outcome in outcomes:
         key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)

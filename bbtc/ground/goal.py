@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from typing_extensions import assert_never
 
-from bbtc.diagnostics import Diagnostic, Related, Report, Severity
+from bbtc.diagnostics import Diagnostic, Related, Report
 from bbtc.ground.lower import Lowering
 from bbtc.ground.missing import Fact, Lack, Missing, NoneTogether, NoObject, Search
 from bbtc.ground.normal import conjuncts
@@ -86,8 +86,7 @@ def _never(
         f"{_nothing(model, [each.what for each in missing])} can make the goal {_shown(first, model)} true",
         first.span or model.goal_span,
         _hint(reached, missing),
-        Severity.WARNING,
-        (*_related(missing), *(Related("nor this", part.span) for part in others[:_MOST_NAMED])),
+        related=(*_related(missing), *(Related("nor this", part.span) for part in others[:_MOST_NAMED])),
     )
 
 
@@ -113,8 +112,7 @@ def _forgotten(model: md.Model, universe: Universe, missing: Sequence[Missing]) 
         f"{_nothing(model, facts)} makes {names}{more} unknown",
         model.init.span or model.problem_span,
         f"add `{texts}` to `:init`: what it does not mention is false",
-        Severity.WARNING,
-        _related(missing[:_MOST_NAMED]),
+        related=_related(missing[:_MOST_NAMED]),
     )
 
 

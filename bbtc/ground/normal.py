@@ -1,4 +1,26 @@
-"""Lifted effects and conditions in normal form."""
+"""Lifted effects and conditions in normal form.
+
+Of effects (:func:`normalise`), ``chance`` being ``probabilistic`` or ``oneof``, these rules leave settings
+and chances that stand side by side, each with its quantifiers around its guard:
+
+1. ``(forall (?x) (and d e))`` → ``(and (forall (?x) d) (forall (?x) e))``; so with ``when`` for ``forall``
+2. ``(when f (when g e))`` → ``(when (and f g) e)``, the guard in normal form
+3. ``(when f (forall (?x) e))`` → ``(forall (?x) (when f e))``: no quantifier takes a name from around it
+4. ``(forall (?x) (forall (?y) e))`` → ``(forall (?x ?y) e)``
+5. ``(chance p d 0 e)`` → ``(chance p d)``
+6. ``(chance 1 e)`` → ``e``
+
+Of conditions (:func:`normal_form`), these leave negations of atoms and equations only, and quantifiers of one
+parameter each, with nothing inside that does not read it. They are exact in strong Kleene logic, which is a
+distributive lattice where negation reverses the order:
+
+7. ``(not (not f))`` → ``f``
+8. ``(not (and f g))`` → ``(or (not f) (not g))``; so with ``and`` and ``or`` exchanged
+9. ``(not (forall (?x) f))`` → ``(exists (?x) (not f))``; so with ``exists`` and ``forall`` exchanged
+10. ``(not (unknown p))`` → ``(known p)``; so with ``known`` and ``unknown`` exchanged
+11. ``(forall (?x ?y) f)`` → ``(forall (?x) (forall (?y) f))``; so with ``exists``
+12. ``(exists (?x) (and f (g ?x)))`` → ``(and f (exists (?x) (g ?x)))``; so with ``forall`` and ``or``
+"""
 
 from __future__ import annotations
 
@@ -46,7 +68,7 @@ class Block:
 
 def normalise(effect: me.Effect) -> Block:
     """The effect as single settings with their quantifiers and guard, beside the chances they are
-    drawn with. Branches of probability 0 are gone, and a chance of one branch is no chance."""
+    drawn with, by rules 1 to 6."""
     items: list[Item] = []
     chances: list[Chance] = []
     _walk(effect, (), (), items, chances)
@@ -63,16 +85,16 @@ def _walk(
     match effect:
         case me.Set() | me.Add():
             items.append(Item(parameters, guard, effect))
-        case me.Together(parts):
+        case me.Together(parts):  # 1
             for part in parts:
                 _walk(part, parameters, guard, items, chances)
-        case me.When(condition, inner):
+        case me.When(condition, inner):  # 2
             _walk(inner, parameters, (*guard, *conjuncts(normal_form(condition))), items, chances)
-        case me.ForEach(more, inner):
+        case me.ForEach(more, inner):  # 3, 4
             _walk(inner, parameters + more, guard, items, chances)
         case me.Choice(branches, oneof):
-            possible = [branch for branch in branches if branch.probability > 0]
-            if len(possible) == 1:
+            possible = [branch for branch in branches if branch.probability > 0]  # 5
+            if len(possible) == 1:  # 6
                 _walk(possible[0].effect, parameters, guard, items, chances)
             elif possible:
                 drawn = tuple((branch.probability, normalise(branch.effect)) for branch in possible)
@@ -139,27 +161,22 @@ def _terms(amount: me.Amount) -> Iterator[str]:
 
 
 def normal_form(formula: mf.Formula, negative: bool = False) -> mf.Formula:
-    """Negation normal form: negations stand at atoms and equalities only; quantifiers bind one
-    parameter each, and what does not depend on it stands outside (exact in Kleene logic, a
-    distributive lattice)."""
+    """The condition, or its negation, in negation normal form, by rules 7 to 12."""
     match formula:
         case mf.Atom() | mf.Equal():
             return mf.Not(formula) if negative else formula
         case mf.Test(kind, atom, span):
             other: Literal["unknown", "known"] = "known" if kind == "unknown" else "unknown"
-            return mf.Test(other, atom, span) if negative else formula
-        case mf.Not(part):
+            return mf.Test(other, atom, span) if negative else formula  # 10
+        case mf.Not(part):  # 7
             return normal_form(part, not negative)
-        case mf.And(parts, span):
-            each = tuple(normal_form(part, negative) for part in parts)
-            return mf.Or(each, span) if negative else mf.And(each, span)
-        case mf.Or(parts, span):
-            each = tuple(normal_form(part, negative) for part in parts)
-            return mf.And(each, span) if negative else mf.Or(each, span)
+        case mf.And(parts, span) | mf.Or(parts, span):  # 8
+            join = mf.And if isinstance(formula, mf.And) is not negative else mf.Or
+            return join(tuple(normal_form(part, negative) for part in parts), span)
         case mf.Quantified(kind, parameters, part, span):
             inner = normal_form(part, negative)
-            universal = (kind == "forall") is not negative
-            for parameter in reversed(parameters):
+            universal = (kind == "forall") is not negative  # 9
+            for parameter in reversed(parameters):  # 11
                 inner = _bind("forall" if universal else "exists", parameter, inner)
             return inner
         case _:
@@ -167,7 +184,7 @@ def normal_form(formula: mf.Formula, negative: bool = False) -> mf.Formula:
 
 
 def _bind(kind: Literal["exists", "forall"], parameter: Parameter, part: mf.Formula) -> mf.Formula:
-    join = mf.And if kind == "exists" else mf.Or
+    join = mf.And if kind == "exists" else mf.Or  # 12
     parts = list(_flat(join, part))
     outside = [each for each in parts if parameter.name not in free(each)]
     inside = [each for each in parts if parameter.name in free(each)]

@@ -121,7 +121,7 @@ class Relevance:
         self.read = set(variables(goal))
         if model.metric == "reward":
             for schema, each in zip(model.schemas.values(), self._schemas, strict=True):
-                if any(isinstance(leaf, me.Add) and leaf.to == "reward" for leaf in me.leaves(schema.effect)):
+                if me.earns(schema.effect):
                     self._keep(each, each.rows)
                     each.left = []
         self._close()

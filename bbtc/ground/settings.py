@@ -97,7 +97,7 @@ class Settings:
     def _merged(self, numbers: Iterable[int | None]) -> dict[int, Truth]:
         sets: dict[int, Truth] = {}
         for number, plain in zip(numbers, self._plain, strict=True):
-            # Where one occurrence sets a variable twice, the Kleene maximum wins.
+            # Rule 4 of bbtc.ground.effects.
             if number is not None and sets.get(number, -1) < plain.value:
                 sets[number] = plain.value
         return sets

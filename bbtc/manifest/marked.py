@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bbtc.artefacts.cursor import Fault, clip
+from bbtc.artefacts.cursor import clip
 from bbtc.artefacts.jsontext import Path, path_text
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.source import SourceFile, Span
@@ -45,7 +45,7 @@ class Marked:
     spans: Mapping[Path, Span]
     keys: Mapping[Path, Span]
 
-    def locate(self, faults: Sequence[Fault]) -> list[Span | None]:
+    def locate(self, faults: Sequence[Diagnostic]) -> list[Span | None]:
         """The place of each fault: of the key, if that is what is wrong, else of the value."""
         return [
             self.keys.get(fault.path) or self.span(fault.path)

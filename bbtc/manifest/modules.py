@@ -6,14 +6,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING
 
 from bbtc.backends.names import module_name
 from bbtc.backends.pytrees.exporter import py_trees
 from bbtc.backends.pytrees.robot import MODULE, is_module, py_trees_robot
-
-if TYPE_CHECKING:
-    from bbtc.manifest.read import Export
+from bbtc.manifest.entries import Export
 
 TREE, ROBOT = py_trees.name, py_trees_robot.name
 

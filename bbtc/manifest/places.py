@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bbtc.artefacts.cursor import At, Fault
+from bbtc.artefacts.cursor import At
 from bbtc.backends.begun import BESIDE
+from bbtc.diagnostics import Diagnostic
 from bbtc.files.read_write import KEPT, ignores_case
 from bbtc.manifest.find import TOML_NAME, YAML_NAME
 
@@ -40,7 +41,7 @@ class Places:
         """A file, or a folder of files, that is made."""
         self._claims.append(_Claim(at, file, owner, folder))
 
-    def faults(self) -> Iterator[Fault]:
+    def faults(self) -> Iterator[Diagnostic]:
         """Every place that is not its maker's alone."""
         fold = ignores_case(str(self.file))
         owners: dict[tuple[str, ...], _Claim] = {}
@@ -53,12 +54,12 @@ class Places:
             parts = _parts(claim.file, fold)
             if KEPT & {part.casefold() for part in parts}:
                 kept = " or ".join(sorted(KEPT))
-                yield claim.at.fault("BBT1009", f"{claim.file}: nothing is made in {kept}")
+                yield claim.at.found("BBT1009", f"{claim.file}: nothing is made in {kept}")
             elif parts in sources:
-                yield claim.at.fault("BBT1009", f"{claim.file} is a source of the project")
+                yield claim.at.found("BBT1009", f"{claim.file} is a source of the project")
             elif parts in around:
                 what = "is a folder of" if claim.folder else "is the folder of"
-                yield claim.at.fault("BBT1009", f"{claim.file} {what} the source {around[parts]}")
+                yield claim.at.found("BBT1009", f"{claim.file} {what} the source {around[parts]}")
             other = owners.setdefault(parts, claim)
             if other is not claim:
                 owners_of_it = f"'{other.owner}' and for '{claim.owner}'"
@@ -77,8 +78,8 @@ class Places:
                     yield _twice(claim, f"{claim.file} is inside the {what} that is made for '{outer.owner}'")
 
 
-def _twice(claim: _Claim, message: str) -> Fault:
-    return claim.at.fault("BBT1003", message)
+def _twice(claim: _Claim, message: str) -> Diagnostic:
+    return claim.at.found("BBT1003", message)
 
 
 def _parts(path: str, fold: bool) -> tuple[str, ...]:

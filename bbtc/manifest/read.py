@@ -9,19 +9,20 @@ from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TypeVar, cast
 
-from bbtc.artefacts.cursor import At, Fault, Faults, Stop, clip, run_reader
+from bbtc.artefacts.cursor import At, Faults, Stop, clip, run_reader
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.backends.exporter import Exporter
 from bbtc.backends.registry import load_exporter, parse_options
-from bbtc.diagnostics import BbtcError
+from bbtc.diagnostics import BbtcError, Unreadable
 from bbtc.manifest import modules
+from bbtc.manifest.entries import Export, Manifest, TreeEntry
 from bbtc.manifest.expectations import Expectation, parse_expectation
 from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
 from bbtc.manifest.places import Places
 from bbtc.planner.options import Retries
 from bbtc.planner.strategies import DEFAULT, STRATEGIES
 from bbtc.printable import printable
-from bbtc.source import AS_WRITTEN, Reading, Span
+from bbtc.source import Reading
 from bbtc.syntax.reader import decode_source
 
 _T = TypeVar("_T")
@@ -37,57 +38,6 @@ _READING = ("problem-name", "lenient")
 _PLANNING = ("target", "strategy", "max-actions", "retries", "guarded", "limits")
 _SETTINGS = (*_INPUTS, *_READING, *_PLANNING, "exports", "expect")
 _LIMITS = {"time": "seconds", "states": "states", "nodes": "nodes", "ground-actions": "actions"}
-
-
-@dataclass(frozen=True, slots=True)
-class Export:
-    """An artefact to make of a tree. ``file`` is relative to the project's folder; it is a folder
-    where the format is several files (``many``). ``options`` are those given, by name."""
-
-    name: str
-    form: str
-    file: str
-    options: tuple[tuple[str, str], ...] = ()
-    many: bool = False
-    span: Span | None = field(default=None, compare=False)
-
-
-@dataclass(frozen=True, slots=True)
-class TreeEntry:
-    """A tree of the project: what it is made from, how, into which files, and what is expected of it.
-
-    ``inputs`` and ``file`` are relative to the project's folder. ``limits`` are fields of
-    :class:`bbtc.limits.Limits`; ``target`` None stands for the problem's own.
-    """
-
-    name: str
-    inputs: tuple[str, ...]
-    file: str
-    target: Fraction | None = None
-    strategy: str = DEFAULT
-    max_actions: int | None = None
-    retries: Retries = "least"
-    guarded: bool = False
-    reading: Reading = AS_WRITTEN
-    limits: tuple[tuple[str, int | None], ...] = ()
-    exports: tuple[Export, ...] = ()
-    expect: tuple[Expectation, ...] = ()
-    span: Span | None = field(default=None, compare=False)
-    input_spans: tuple[Span | None, ...] = field(default=(), compare=False)
-    """Where the manifest names the inputs."""
-
-
-@dataclass(frozen=True, slots=True)
-class Manifest:
-    """A project: the folder that its files are relative to, and its trees in the order given."""
-
-    file: Path
-    trees: tuple[TreeEntry, ...]
-
-    @property
-    def folder(self) -> Path:
-        """The folder of the manifest."""
-        return self.file.parent
 
 
 # --- what it says ----------------------------------------------------------------------------
@@ -131,8 +81,8 @@ class _Reader:
         for name, entry in members["trees"].entries():
             try:
                 trees.append(self._tree(name, entry, defaults))
-            except Fault as fault:
-                self.faults.add(fault)
+            except Unreadable as fault:
+                self.faults.add(fault.diagnostic)
         for wrong in self.places.faults():
             self.faults.add(wrong)
         return Manifest(file, tuple(trees))
@@ -212,8 +162,8 @@ class _Reader:
         for name, each in named:
             try:
                 exports.append(self._export(name, each, tree, forms))
-            except Fault as fault:
-                self.faults.add(fault)
+            except Unreadable as fault:
+                self.faults.add(fault.diagnostic)
         places = dict(named)
         return tuple(self._with_module(places[export.name], export, exports) for export in exports)
 
@@ -223,7 +173,7 @@ class _Reader:
             return modules.with_module(export, exports) if export.form == modules.ROBOT else export
         except ValueError as error:
             hint = "name its file otherwise, or say `options: {module: …}`"
-            self.faults.add(at.fault("BBT0707", printable(str(error)), hint))
+            self.faults.add(at.found("BBT0707", printable(str(error)), hint))
             return export
 
     def _export(self, name: str, at: At, tree: str, forms: list[str]) -> Export:
@@ -281,7 +231,7 @@ class _Reader:
         """Defaults and aliases let a short text say very much."""
         self.left -= values
         if self.left < 0:
-            self.faults.add(at.fault("BBT0005", f"the trees have more than {MOST_VALUES} settings in all"))
+            self.faults.add(at.found("BBT0005", f"the trees have more than {MOST_VALUES} settings in all"))
             raise Stop
 
 

@@ -5,13 +5,15 @@ Frozen; names are keys (lower case) and all of them are declared. Every declarat
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
+from typing_extensions import assert_never
+
 from bbtc.kleene import Truth
-from bbtc.model.effect import Choice, Effect
+from bbtc.model.effect import Choice, Effect, Set, leaves
 from bbtc.model.formula import Formula, Term
 from bbtc.model.types import Object, Parameter, TypeHierarchy
 from bbtc.source import Span
@@ -194,3 +196,29 @@ class Model:
     goal_span: Span | None = field(default=None, compare=False, repr=False)
     span: Span | None = field(default=None, compare=False, repr=False)
     problem_span: Span | None = field(default=None, compare=False, repr=False)
+
+
+def calls(body: Body) -> Iterator[BodyCall]:
+    """The calls in a body, from left to right."""
+    match body:
+        case BodyCall():
+            yield body
+        case BodyControl(_, children):
+            for child in children:
+                yield from calls(child)
+        case BodyForeach(_, child):
+            yield from calls(child)
+        case BodyCondition():
+            return
+        case _:
+            assert_never(body)
+
+
+def set_values(model: Model) -> dict[str, set[Truth]]:
+    """The values that actions may give the atoms of each predicate that any sets."""
+    found: dict[str, set[Truth]] = {}
+    for schema in model.schemas.values():
+        for leaf in leaves(schema.effect, possible=True):
+            if isinstance(leaf, Set):
+                found.setdefault(leaf.predicate, set()).add(leaf.value)
+    return found

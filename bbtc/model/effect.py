@@ -113,21 +113,33 @@ Effect: TypeAlias = Set | Together | When | ForEach | Choice | Add
 NOTHING = Together(())
 
 
-def leaves(effect: Effect) -> Iterator[Set | Add]:
-    """Everything the effect may do, from left to right."""
+def leaves(effect: Effect, *, possible: bool = False) -> Iterator[Set | Add]:
+    """Everything the effect does somewhere, from left to right; with ``possible``, but for branches of
+    probability 0."""
     match effect:
         case Set() | Add():
             yield effect
         case Together(parts):
             for part in parts:
-                yield from leaves(part)
+                yield from leaves(part, possible=possible)
         case When(_, inner) | ForEach(_, inner):
-            yield from leaves(inner)
+            yield from leaves(inner, possible=possible)
         case Choice(branches):
             for branch in branches:
-                yield from leaves(branch.effect)
+                if branch.probability > 0 or not possible:
+                    yield from leaves(branch.effect, possible=possible)
         case _:
             assert_never(effect)
+
+
+def settings(effect: Effect) -> Iterator[Set]:
+    """Every setting in the effect."""
+    return (leaf for leaf in leaves(effect) if isinstance(leaf, Set))
+
+
+def earns(effect: Effect) -> bool:
+    """Whether anything in the effect adds to the reward."""
+    return any(isinstance(leaf, Add) and leaf.to == "reward" for leaf in leaves(effect))
 
 
 def conditions(effect: Effect) -> Iterator[Formula]:

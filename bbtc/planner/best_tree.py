@@ -11,7 +11,7 @@ from bbtc.diagnostics import Diagnostic
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.result import Plan, Refinement
-from bbtc.tree.nodes import ConditionNode, Node, Status, Tree, walk
+from bbtc.tree.nodes import ConditionNode, Node, PlanStatus, Tree, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ class BestTree:
         if self.outer is not None:
             self.outer.offer(root, chain, success, steps)
 
-    def plan(self, status: Status, stop: Diagnostic | None = None, known: Figures | None = None) -> Plan:
+    def plan(self, status: PlanStatus, stop: Diagnostic | None = None, known: Figures | None = None) -> Plan:
         """The plan of the tree kept; one that reaches the target has done so, whatever ended the search."""
         if self._kept is None:
             goal = ConditionNode("n1", self.task.goal)

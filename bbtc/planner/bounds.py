@@ -11,11 +11,11 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan
-from bbtc.tree.nodes import Status
+from bbtc.tree.nodes import PlanStatus
 
 if TYPE_CHECKING:
-    from bbtc.planner.mdp.explore import StateSpace
     from bbtc.planner.mdp.maxprob import Bounds
+    from bbtc.planner.mdp.state_space import StateSpace
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ def judged(plan: Plan, limits: Limits, options: Options = DEFAULTS) -> Plan:
         pass
     except KeyboardInterrupt:
         return replace(plan, tree=replace(tree, status="interrupted"))
-    status: Status = "out-of-reach" if upper < tree.target else tree.status
+    status: PlanStatus = "out-of-reach" if upper < tree.target else tree.status
     if interrupted:
         status = "interrupted"
     return replace(plan, tree=replace(tree, status=status, bounds=(lower, upper)))

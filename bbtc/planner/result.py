@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
 from bbtc.belief.chain import Chain
 from bbtc.belief.simulate import Figures
 from bbtc.diagnostics import Diagnostic
-from bbtc.ground.task import Task
 from bbtc.kleene import Truth
-from bbtc.limits import Limits
-from bbtc.planner.options import Options
 from bbtc.tree.nodes import Tree
 
 
@@ -24,7 +21,7 @@ class Refinement:
     ``condition`` was ``value`` in runs of total probability ``probability``; ``inserted`` names
     the action or template inserted, or whose branch was moved; once its preconditions hold,
     ``unmet`` of which did not hold yet, it makes the condition hold (known, if it was unknown) with
-    probability ``chance``, and unknown, so that it can be observed, with ``open``.
+    probability ``chance``, and unknown, so that it can be observed, with ``observable``.
     ``success`` is the tree's success probability afterwards. A retreat takes back the last
     ``taken_back`` refinements, which brought nothing, the first of them being the one it names.
     """
@@ -35,7 +32,7 @@ class Refinement:
     probability: Fraction
     inserted: str
     chance: Fraction = Fraction(0)
-    open: Fraction = Fraction(0)
+    observable: Fraction = Fraction(0)
     unmet: int = 0
     success: Fraction = Fraction(0)
     nodes: int = 0
@@ -60,13 +57,3 @@ class Plan:
     def _repr_svg_(self) -> str | None:
         """The picture of the tree, for notebooks."""
         return self.tree._repr_svg_()
-
-
-class Strategy(Protocol):
-    """A planner: from a ground task and a target probability to a plan. Always returns."""
-
-    def __call__(
-        self, task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = ...
-    ) -> Plan:
-        """Plan. ``progress`` is told every refinement as it is made."""
-        ...

@@ -1,27 +1,60 @@
-"""The planning strategies by name."""
+"""The planning strategies by name, and what each can do: options, refusals and help follow from the table."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from importlib import import_module
+from typing import Protocol
 
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.options import Options
-from bbtc.planner.result import Plan, Progress, Strategy
+from bbtc.planner.result import Plan, Progress
+
+
+class Strategy(Protocol):
+    """A planner: from a ground task and a target probability to a plan. Always returns."""
+
+    def __call__(
+        self, task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = ...
+    ) -> Plan:
+        """Plan. ``progress`` is told every refinement as it is made."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """Module and function of a strategy, imported when used, and which options it knows: ``max_actions`` is
+    refused where it does not; ``retries`` changes nothing there."""
+
+    module: str
+    function: str
+    max_actions: bool = False
+    retries: bool = False
+
+    def load(self) -> Strategy:
+        """The strategy."""
+        found: Strategy = getattr(import_module(self.module), self.function)
+        return found
+
 
 STRATEGIES = {
-    "refine": ("bbtc.planner.chaining.refine", "refine"),
-    "search": ("bbtc.planner.chaining.search", "plan_search"),
-    "policy": ("bbtc.planner.synthesis.policy", "plan_policy"),
-    "auto": ("bbtc.planner.auto", "plan_auto"),
-    "advised": ("bbtc.planner.auto", "plan_advised"),
+    "refine": Entry("bbtc.planner.chaining.refine", "refine"),
+    "search": Entry("bbtc.planner.chaining.search", "plan_search", retries=True),
+    "policy": Entry("bbtc.planner.synthesis.policy", "plan_policy", max_actions=True, retries=True),
+    "auto": Entry("bbtc.planner.auto", "plan_auto", max_actions=True, retries=True),
+    "advised": Entry("bbtc.planner.auto", "plan_advised", max_actions=True, retries=True),
 }
-"""Module and function of each strategy, imported when used."""
 
 DEFAULT = "advised"
+
+
+def others(those: Callable[[Entry], bool] = lambda _: True) -> str:
+    """The names of strategies other than the default, for help."""
+    return ", ".join(name for name, entry in STRATEGIES.items() if name != DEFAULT and those(entry))
 
 
 def require_strategy(name: str, options: Options) -> None:
@@ -30,11 +63,11 @@ def require_strategy(name: str, options: Options) -> None:
         raise BbtcError.single(
             "BBT0501", f"unknown strategy '{name}'", hint=f"known: {', '.join(STRATEGIES)}"
         )
-    if name in {"refine", "search"} and options.max_actions is not None:
+    if options.max_actions is not None and not STRATEGIES[name].max_actions:
         raise BbtcError.single(
             "BBT0503",
             f"the strategy '{name}' does not plan within a number of actions",
-            hint="use --strategy policy",
+            hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.max_actions)}",
         )
 
 
@@ -43,13 +76,11 @@ def run_strategy(
 ) -> Plan:
     """Plan with a strategy. Raises :class:`BbtcError` as :func:`require_strategy` does."""
     require_strategy(name, options)
-    module, function = STRATEGIES[name]
-    strategy: Strategy = getattr(import_module(module), function)
     from bbtc.planner.guard import guarded, most_more
 
     # Strategies need not know of guards: they change nothing in the simulation.
     unguarded = replace(options, guarded=False)
     if options.guarded:
         limits = replace(limits, nodes=max(1, limits.nodes - most_more(task)))
-    plan = strategy(task, target, limits, progress, unguarded)
+    plan = STRATEGIES[name].load()(task, target, limits, progress, unguarded)
     return guarded(plan, limits) if options.guarded else plan

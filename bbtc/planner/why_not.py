@@ -16,7 +16,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import Scenario, scenarios
 from bbtc.belief.state import Values
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts
 from bbtc.ground.describe import describe
@@ -24,7 +24,7 @@ from bbtc.ground.repair import Every, Need, Repairs, Root, Some, Way, every, som
 from bbtc.ground.task import Effect, GroundAction, Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.planner.chaining.relaxed import Facts, RelaxedReachability, possible
+from bbtc.planner.mdp.h_add import Facts, Relaxation, possible
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree
 
@@ -73,15 +73,15 @@ def dead_ends(tree: Tree, limits: Limits) -> tuple[DeadEnd, ...]:
     task = tree.task
     chain = explore(task, tree.root, limits)
     visits = Absorption(chain).visits()
-    ends = {state for state in chain.final if chain.status[state] is not Status.SUCCESS}
+    ends = {state for state in chain.final if chain.status[state] is not NodeStatus.SUCCESS}
     weights: dict[tuple[str | None, int], Fraction] = {}
     for probability, state in chain.initial:
         if state in ends and probability:
             weights[None, state] = probability
     for state, edges in enumerate(chain.edges):
         for edge in edges:
-            if edge.target in ends:
-                last = chain.actions[chain.action[state]].action, edge.target
+            if edge.successor in ends:
+                last = chain.actions[chain.action[state]].action, edge.successor
                 weight = (visits[state] or Fraction(0)) * edge.result.probability
                 weights[last] = weights.get(last, Fraction(0)) + weight
     roots = RootFinder(task, limits)
@@ -121,7 +121,7 @@ class RootFinder:
     def __init__(self, task: Task, limits: Limits) -> None:
         self._task = task
         self._limits = limits
-        self._relaxed = RelaxedReachability(task, limits)
+        self._relaxed = Relaxation(task, limits)
         self._makers: dict[_Fact, list[tuple[GroundAction, Effect]]] = {}
         for action in task.actions:
             for effect in effects_of(action.factors):

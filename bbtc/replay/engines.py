@@ -18,16 +18,6 @@ from bbtc.replay.ticks import Tick, TickScript, TickWorld
 from bbtc.tree.nodes import Tree
 
 
-def replay_py_trees(tree: Tree, script: Script, timing: Timing = "between") -> Run:
-    """What the exported module does under py_trees."""
-    return PyTreesReplay(tree).run(script, timing)
-
-
-def replay_btcpp(tree: Tree, script: Script, timing: Timing = "between") -> Run:
-    """What the exported XML does under BehaviorTree.CPP (module ``behaviortreepy``)."""
-    return BtcppReplay(tree).run(script, timing)
-
-
 class Engine(Protocol):
     """A tree in an engine, ready to run any number of scripts."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from bbtc.belief.scenarios import Scenario
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.ground.task import Task
 
 Values = tuple[int, ...]
@@ -50,7 +50,7 @@ def run_of(scenario: Scenario) -> Run:
     """What the exact simulation says the tree does. A blocked tree ends in failure."""
     return Run(
         tuple(step.node.action for step in scenario.steps),
-        "success" if scenario.status is Status.SUCCESS else "failure",
+        "success" if scenario.status is NodeStatus.SUCCESS else "failure",
         tuple(scenario.final),
     )
 

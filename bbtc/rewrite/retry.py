@@ -1,4 +1,10 @@
-"""How often to try again: the least number of attempts that meets a target."""
+"""How often to try again: the least number of attempts that meets a target.
+
+Rewrite rules, for a tree whose runs come back to a state; n is the least number that meets the target:
+
+1. ``t`` becomes ``Retry(n, t)`` for the smallest subtree t that holds all actions of such runs.
+2. Where that cannot meet the target, as what follows t takes over too late, t is the whole tree.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +14,7 @@ from fractions import Fraction
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import figures
 from bbtc.belief.soundness import violations
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -29,7 +35,7 @@ def with_least_attempts(task: Task, root: Node, target: Fraction, limits: Limits
     looping = _looping(explore(task, root, limits))
     if not looping:
         return root
-    for place in dict.fromkeys([_lowest_above(root, looping), root.id]):
+    for place in dict.fromkeys([_lowest_above(root, looping), root.id]):  # rule 1, else rule 2
         found = _least(task, root, place, target, limits)
         if found is not None:
             return found
@@ -39,21 +45,21 @@ def with_least_attempts(task: Task, root: Node, target: Fraction, limits: Limits
 def longest_run(chain: Chain) -> int | None:
     """The greatest number of actions in a run; None where runs may come back to a state."""
     longest = [0] * len(chain.states)
-    targets = [[edge.target for edge in edges] for edges in chain.edges]
-    for component in components(targets):  # each after all that it can reach
-        if len(component) > 1 or component[0] in targets[component[0]]:
+    successors = [[edge.successor for edge in edges] for edges in chain.edges]
+    for component in components(successors):  # each after all that it can reach
+        if len(component) > 1 or component[0] in successors[component[0]]:
             return None
         (state,) = component
-        longest[state] = max((1 + longest[target] for target in targets[state]), default=0)
+        longest[state] = max((1 + longest[after] for after in successors[state]), default=0)
     return max((longest[state] for _, state in chain.initial), default=0)
 
 
 def _looping(chain: Chain) -> set[str]:
     """Ids of the action nodes that a run may start in a state it comes back to."""
-    targets = [[edge.target for edge in edges] for edges in chain.edges]
+    successors = [[edge.successor for edge in edges] for edges in chain.edges]
     found: set[str] = set()
-    for component in components(targets):
-        if len(component) > 1 or component[0] in targets[component[0]]:
+    for component in components(successors):
+        if len(component) > 1 or component[0] in successors[component[0]]:
             found.update(chain.actions[chain.action[state]].id for state in component)
     return found
 
@@ -114,11 +120,11 @@ def _expected_attempts(task: Task, root: Node, target: Fraction, limits: Limits)
     for steps in range(_MOST_ATTEMPTS):
         following: dict[int, Fraction] = {}
         for state, probability in mass.items():
-            if chain.status[state] is Status.SUCCESS:
+            if chain.status[state] is NodeStatus.SUCCESS:
                 won += probability
             for edge in chain.edges[state]:
                 share = probability * edge.result.probability
-                following[edge.target] = following.get(edge.target, Fraction(0)) + share
+                following[edge.successor] = following.get(edge.successor, Fraction(0)) + share
         if won >= target:
             return max(1, steps)
         if not following:

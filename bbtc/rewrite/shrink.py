@@ -1,4 +1,11 @@
-"""Smaller trees that still reach the target: alternatives that it does not take are dropped."""
+"""Smaller trees that still reach the target: alternatives that it does not take are dropped.
+
+Rewrite rule, kept if the tree is still worth it (:meth:`_Worth.will_do`); k is a Fallback or a Skipper:
+
+1. ``k(…, c, …)`` becomes ``k(…, …)`` for a branch c with actions, and ``k(c, d)`` becomes ``d``.
+
+The smallest tree that it makes is tried first; what is left is simplified (:mod:`bbtc.rewrite.simplify`).
+"""
 
 from __future__ import annotations
 
@@ -10,7 +17,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.soundness import violations
 from bbtc.belief.state import Transition
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -65,14 +72,14 @@ class _Worth:
     @classmethod
     def of(cls, chain: Chain) -> _Worth:
         visits = Absorption(chain).visits()
-        ends = {status: Fraction(0) for status in Status}
+        ends = {status: Fraction(0) for status in NodeStatus}
         for state in chain.final:
             ends[chain.status[state]] += visits[state] or 0
         endless = 1 - sum(ends.values(), Fraction(0))
         cost = Fraction(0)
         for visit, edges in zip(visits, chain.edges, strict=True):
             cost += (visit or 0) * sum((e.result.probability * e.result.cost for e in edges), Fraction(0))
-        return cls(ends[Status.SUCCESS], endless, None if endless else cost)
+        return cls(ends[NodeStatus.SUCCESS], endless, None if endless else cost)
 
     def will_do(self, before: _Worth, target: Fraction) -> bool:
         """Is it good enough in place of what was before?"""
@@ -90,6 +97,6 @@ def _without_one(node: Node) -> Iterator[Node]:
     for at, child in enumerate(node.children):
         rest = (*node.children[:at], *node.children[at + 1 :])
         if node.kind in {"fallback", "skipper"} and rest and any(actions_of(child)):
-            yield rest[0] if len(rest) == 1 else replace(node, children=rest)
+            yield rest[0] if len(rest) == 1 else replace(node, children=rest)  # rule 1
         for smaller in _without_one(child):
             yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))

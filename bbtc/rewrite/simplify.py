@@ -1,40 +1,51 @@
 """Smaller trees that do the same: no simplification changes what happens in any run.
 
-1. A child that only ever lets its parent go on to the next one is taken out; so is what stands behind a
-   child that never does, and what is never ticked. A control node in one of its own kind, or with one
-   child, dissolves. What a node ever returns is read off every state that a run can visit, so this changes
-   nothing there.
-2. Neighbours that share a child share one copy of it: ``Fallback(Sequence(a, x), Sequence(a, y))`` becomes
-   ``Sequence(a, Fallback(x, y))``, and the like from behind; of equal neighbours one stays. Where the shared
-   test is not the first, the tests are put into another order. This is kept only if both trees, run side by
-   side, do the same (:mod:`bbtc.belief.same_runs`).
+Rewrite rules, for a control node k (Sequence, Fallback or Skipper). What a node ever returns is read off
+every state that a run can visit; with "goes on" for the status after which k ticks its next child:
 
-The result as a whole is compared with the tree given, in the same way.
+1. ``k(…, c, …)`` becomes ``k(…, …)`` if c never does anything but go on, or is never ticked (as what stands
+   behind a child that never goes on).
+2. ``k(…, k(x, …), …)`` becomes ``k(…, x, …, …)``.
+3. ``k(c)`` becomes ``c``.
+
+These change nothing in any state that is visited. The others are tried, and kept if both trees, run side by
+side, do the same (:mod:`bbtc.belief.same_runs`); k is a Sequence or a Fallback and j the other of the two:
+
+4. ``k(…, j(a, x…), j(a, y…), …)`` becomes ``k(…, j(a, k(j(x…), j(y…))), …)`` for a condition a, wherever it
+   stands among its neighbours.
+5. ``k(…, j(x…, a), j(y…, a), …)`` becomes ``k(…, j(k(j(x…), j(y…)), a), …)`` for an action a, likewise.
+
+Rules 1 to 3 are applied until nothing changes, then one of 4 and 5, and so on. The result as a whole is
+compared with the tree given, in the same way. Templates keep the shape that their author gave them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from operator import is_
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.same_runs import same_runs
 from bbtc.belief.state import Transition
-from bbtc.belief.tick import Status, compile_tick
+from bbtc.belief.tick import NodeStatus, compile_tick
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of, walk
 
-GOES_ON: dict[ControlKind, Status] = {
-    "sequence": Status.SUCCESS,
-    "fallback": Status.FAILURE,
-    "skipper": Status.RUNNING,
+GOES_ON: dict[ControlKind, NodeStatus] = {
+    "sequence": NodeStatus.SUCCESS,
+    "fallback": NodeStatus.FAILURE,
+    "skipper": NodeStatus.RUNNING,
 }
 """After which status of a child a control node ticks the next one."""
 
 _MOST_TICKS = 200_000
 """Ticks spent on trying merged trees, each time."""
+
+_LOOK = 1024
+"""States between two looks at the clock."""
 
 _MOST_STATES = 20_000
 """A tree with more states is left as it is."""
@@ -52,9 +63,8 @@ def simplified(
         return root
     found = root
     while True:
-        smaller = _without_idle(
-            task, found, chain if found is root else explore(task, found, limits, transitions)
-        )
+        own = chain if found is root else explore(task, found, limits, transitions)
+        smaller = _without_idle(task, found, own, limits)
         shared = _shared(task, smaller, chain, limits)
         if shared is None:
             break
@@ -84,15 +94,45 @@ def numbered(root: Node) -> Node:
     return visit(root)
 
 
-# --- what never matters ----------------------------------------------------------------------
+# --- what never matters: rules 1 to 3 --------------------------------------------------------
 
 
-def _without_idle(task: Task, root: Node, chain: Chain) -> Node:
-    """Step 1, until nothing more is found."""
+def _returned(task: Task, root: Node, chain: Chain, limits: Limits) -> dict[str, set[int]]:
+    """By the id of each node, what it returns in the states of the tree's chain."""
     returned: dict[str, set[int]] = {node.id: set() for node in walk(root)}
     tick = compile_tick(task, root, lambda node, status: returned[node.id].add(status))
-    for state in chain.states:
+    for number, state in enumerate(chain.states):
+        if number % _LOOK == _LOOK - 1:
+            limits.check_time("the search for a small tree")
         tick(state.values, state.finished)
+    return returned
+
+
+def without_idle_branches(task: Task, root: Node, chain: Chain, limits: Limits) -> Node:
+    """Rule 1 for those alternatives of Fallbacks that hold actions, and rule 3 for Fallbacks: the tree
+    without branches that were tried in vain, its tests as they are. The root itself is returned where nothing
+    was taken out. Raises ``LimitReached`` when the time is over."""
+    returned = _returned(task, root, chain, limits)
+
+    def kept(node: Node) -> Node:
+        if not isinstance(node, ControlNode):
+            return node
+        children = node.children
+        if node.kind == "fallback" and node.template is None:
+            used = [c for c in children if returned[c.id] - {NodeStatus.FAILURE} or not any(actions_of(c))]
+            children = tuple(used) or children
+        children = tuple(kept(child) for child in children)
+        if node.kind == "fallback" and len(children) == 1:
+            return children[0]
+        unchanged = len(children) == len(node.children) and all(map(is_, children, node.children))
+        return node if unchanged else replace(node, children=children)
+
+    return kept(root)
+
+
+def _without_idle(task: Task, root: Node, chain: Chain, limits: Limits) -> Node:
+    """Rules 1 to 3, until nothing more is found."""
+    returned = _returned(task, root, chain, limits)
 
     def kept(node: Node) -> Node:
         if not isinstance(node, ControlNode) or node.template is not None:
@@ -102,15 +142,12 @@ def _without_idle(task: Task, root: Node, chain: Chain) -> Node:
         goes_on = GOES_ON[node.kind]
         children: list[Node] = []
         for child in node.children:
-            seen = returned[child.id]
-            if seen and seen != {int(goes_on)}:
-                children.extend(_dissolved(node.kind, kept(child)))
-            if goes_on not in seen:
-                break  # what follows is never ticked
+            if returned[child.id] - {goes_on}:  # else rule 1
+                children.extend(_dissolved(node.kind, kept(child)))  # rule 2
         if not children:
             children = [kept(node.children[0])]
         if len(children) == 1:
-            return children[0]
+            return children[0]  # rule 3
         return replace(node, children=tuple(children))
 
     return kept(root)
@@ -122,11 +159,11 @@ def _dissolved(kind: ControlKind, child: Node) -> Sequence[Node]:
     return (child,)
 
 
-# --- what stands twice -----------------------------------------------------------------------
+# --- what stands twice: rules 4 and 5 --------------------------------------------------------
 
 
 def _shared(task: Task, root: Node, chain: Chain, limits: Limits) -> Node | None:
-    """Step 2, once: the first smaller tree that does the same; None if there is none."""
+    """Rule 4 or 5, once: the first smaller tree that does the same; None if there is none."""
     for tried, smaller in enumerate(_merged(root)):
         limits.check_time("the search for a small tree")
         if tried * len(chain.states) > _MOST_TICKS:
@@ -152,9 +189,6 @@ def _merged(node: Node) -> Iterator[Node]:
 
 
 def _pair(above: ControlNode, inner: ControlKind, one: Node, other: Node) -> Iterator[Node]:
-    if _same(one, other):
-        yield one
-        return
     first, second = _parts(inner, one), _parts(inner, other)
     if isinstance(other, ControlNode) and len(second) > 1:
         for part in first:
@@ -170,6 +204,7 @@ def _pair(above: ControlNode, inner: ControlKind, one: Node, other: Node) -> Ite
                 choice = ControlNode(
                     f"{other.id}.or", above.kind, tuple(each for each in rest if each is not None)
                 )
+                # Rule 4, else rule 5.
                 order = (part, choice) if isinstance(part, ConditionNode) else (choice, part)
                 yield replace(other, kind=inner, children=order)
 

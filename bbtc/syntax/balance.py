@@ -13,7 +13,9 @@ import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bbtc.syntax.scan import Fault, blank
+from bbtc.diagnostics import Diagnostic, Related
+from bbtc.source import SourceFile, Span
+from bbtc.syntax.scan import blank
 
 # A parenthesis with the word after it, or a field.
 _MARK = re.compile(r"\(\s*([^\s()?]*)|\)|(?<![^\s()])(?::[a-z-]+|define(?=\s*\())", re.IGNORECASE | re.ASCII)
@@ -69,7 +71,8 @@ class Balance:
     """The unbalanced parentheses of a text, and the text with the sections that hold them blanked."""
 
     text: str
-    faults: list[Fault] = field(default_factory=list)
+    source: SourceFile
+    faults: list[Diagnostic] = field(default_factory=list)
     extras: list[Extra] = field(default_factory=list)
     open_end: Extra | None = None
     """The fault that the last definition is never closed, and its last section."""
@@ -144,7 +147,11 @@ class Balance:
             blank(self._edited, outer.start, start)
         else:
             message = f"{outer.shown} cannot stand here: a definition holds sections such as `(:action`"
-            self.faults.append(Fault("BBT0101", message, outer.start, outer.start + 1 + len(outer.word)))
+            self.faults.append(
+                Diagnostic(
+                    "BBT0101", message, self.source.span(outer.start, outer.start + 1 + len(outer.word))
+                )
+            )
             blank(self._edited, outer.start, start)
             self._surplus += len(self._stack) - 1
         del self._stack[1:]
@@ -157,7 +164,9 @@ class Balance:
             return
         end = start + len(word)
         self.faults.append(
-            Fault("BBT0101", f"`{word}` lacks its parenthesis", start, end, f"write `({word}`")
+            Diagnostic(
+                "BBT0101", f"`{word}` lacks its parenthesis", self.source.span(start, end), f"write `({word}`"
+            )
         )
         if self._edited[start - 1 : start].isspace():
             self._edited[start - 1] = ord("(")
@@ -225,14 +234,24 @@ class Balance:
         if self._suspect is not None and self._suspect.start >= self._section:
             place = self._suspect
         self._suspect = None
-        related = (f"still open where {found} starts", at, at + 1) if at < len(self.text) else None
+        open_still = Related(f"still open where {found} starts", Span(self.source, at, at + 1))
+        related = (open_still,) if at < len(self.text) else ()
         end = place.start + 1 + len(place.word)
         self.faults.append(
-            Fault("BBT0102", f"{place.shown} is never closed", place.start, end, None, related)
+            Diagnostic(
+                "BBT0102",
+                f"{place.shown} is never closed",
+                self.source.span(place.start, end),
+                related=related,
+            )
         )
 
     def _extra(self, start: int, why: str) -> None:
         blank(self._edited, start, start + 1)
         self.extras.append(Extra(len(self.faults), self._section, start))
         message = f"this parenthesis {why}"
-        self.faults.append(Fault("BBT0103", message, start, start + 1, "remove it, or open one before it"))
+        self.faults.append(
+            Diagnostic(
+                "BBT0103", message, self.source.span(start, start + 1), "remove it, or open one before it"
+            )
+        )

@@ -1,599 +1,392 @@
-"""From what the grammar recognises to syntax nodes: one function per rule of ``grammar/bbtc.lark``."""
+"""From what the grammar recognises to syntax nodes: one method per rule of ``grammar/bbtc.lark``.
+
+A method's parameters are the children of its production, in order and with their types: terminals are tokens,
+rules are what their methods return, and ``item*`` is a list. A test holds the types to the grammar.
+"""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax import ast, leaves
 from bbtc.syntax.engine import Token
-from bbtc.syntax.hints import CONNECTIVES, NOT_IN_EFFECT, nearest
-from bbtc.syntax.leaves import SOURCE, Misuse, between, of
+from bbtc.syntax.expressions import Expressions, Operand, keyword, numeric, parameters_of, unsupported
+from bbtc.syntax.leaves import Misuse
 
-_WORD = re.compile(r"\??[^\s()?]+")
+_V_co = TypeVar("_V_co", covariant=True)
+_Predicate: TypeAlias = ast.PredicateDeclaration
+_Function: TypeAlias = ast.FunctionDeclaration
+InitElements: TypeAlias = list[ast.InitElement | list[ast.InitElement]]
+"""Elements of ``:init``; a list is a run of facts."""
+_LISTS: Mapping[str, Literal["types", "constants", "objects"]]
+_LISTS = {"TYPES": "types", "CONSTANTS": "constants", "OBJECTS": "objects"}
+_GOALS: Mapping[str, Literal["goal-probability", "goal-reward"]]
+_GOALS = {"GOAL_PROBABILITY": "goal-probability", "GOAL_REWARD": "goal-reward"}
+_CONTROLS: Mapping[str, Literal["sequence", "fallback", "skipper"]]
+_CONTROLS = {"SEQUENCE": "sequence", "FALLBACK": "fallback", "SKIPPER": "skipper"}
 
 
-class Field(NamedTuple):
+class Types(NamedTuple):
+    """``- type`` or ``- (either type…)`` behind names."""
+
+    names: tuple[ast.Name, ...]
+    span: Span
+
+
+class DerivedHead(NamedTuple):
+    """``(name params)`` of a derived fact."""
+
+    name: Token
+    parameters: ast.TypedList
+    close: Token
+
+
+# --- fields ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Field(Generic[_V_co]):
     """One field of an action, a template, a sensor or an axiom: ``keyword value``."""
 
-    kind: str
     keyword: Token
-    value: Any
+    value: _V_co
 
 
-def _covering(nodes: Sequence[Any]) -> Span:
-    first, last = nodes[0].span, nodes[-1].span
-    return Span(first.source, first.start, last.end)
+class Parameters(Field[ast.TypedList]):
+    """``:parameters``, ``:vars``."""
 
 
-def _number(token: Token) -> ast.Number:
-    return leaves.number(token.text, of(token))
+class Condition(Field[ast.Formula]):
+    """``:precondition``, ``:condition`` of a sensor, ``:context``."""
 
 
-def _unsupported(construct: str, first: Token, last: Token) -> ast.Unsupported:
-    return ast.Unsupported(construct, leaves.plain_text(first, last), between(first, last))
+class Effect(Field[ast.Effect]):
+    """``:effect``."""
 
 
-def _keyword(token: Token) -> str:
-    """The keyword in a terminal that opens a form."""
-    return token.text.lstrip("(").strip().lower()
+class Observe(Field[ast.Observation]):
+    """``:observe``."""
 
 
-def _fields(fields: Iterable[Field]) -> dict[str, Field]:
-    """Fields by kind; each may be given once."""
-    found: dict[str, Field] = {}
-    for field in fields:
-        before = found.setdefault(field.kind, field)
-        if before is not field:
-            raise Misuse(
-                "BBT0110",
-                f"`{field.keyword.text.lower()}` is given twice",
-                of(field.keyword),
-                None,
-                of(before.keyword),
-            )
-    return found
+class Body(Field[ast.Body]):
+    """``:body`` of a template."""
 
 
-def _value(fields: dict[str, Field], kind: str) -> Any:
-    return fields[kind].value if kind in fields else None
+class Sensed(Field[ast.Formula]):
+    """``:sensed``."""
 
 
-def _required(fields: dict[str, Field], kind: str, keyword: str, what: str, name: Token) -> Any:
-    if kind not in fields:
-        raise Misuse("BBT0111", f"{what} lacks `{keyword}`", of(name))
-    return fields[kind].value
+class Implied(Field[ast.Atom]):
+    """``:implies``."""
 
 
-def _parameters(entries: ast.TypedList, last: Token) -> ast.TypedList:
-    """Parameters of a form. Some files write ``?b-block`` for ``?b - block``: read it so where the form
-    uses ``?b`` and never ``?b-block``."""
-    if not any("-" in name.text for group in entries for name in group.names):
-        return entries
-    end = entries[-1].span.end
-    used = {word.lower() for word in _WORD.findall(SOURCE.get().text[end : last.start])}
-    groups: list[ast.TypedGroup] = []
-    for group in entries:
-        names: list[ast.Term] = []
-        for name in group.names:
-            short, _, kind = name.text.partition("-")
-            if not kind or kind[0] == "-" or name.key in used or short.lower() not in used:
-                names.append(name)
-                continue
-            source, start, stop = name.span
-            middle = start + len(short)
-            names.append(ast.Variable(short, Span(source, start, middle)))
-            type_name = ast.Name(kind, Span(source, middle + 1, stop))
-            groups.append(ast.TypedGroup(tuple(names), (type_name,), Span(source, names[0].span.start, stop)))
-            names = []
-        if names:
-            groups.append(
-                ast.TypedGroup(
-                    tuple(names), group.types, Span(group.span.source, names[0].span.start, group.span.end)
-                )
-            )
-    return tuple(groups)
+class _Fields:
+    """The fields of a form, by kind. Raises :class:`Misuse` if one is given twice."""
+
+    def __init__(self, fields: Iterable[Field[object]]) -> None:
+        self._found: dict[type, Field[object]] = {}
+        for field in fields:
+            before = self._found.setdefault(type(field), field)
+            if before is not field:
+                message = f"`{field.keyword.text.lower()}` is given twice"
+                raise Misuse("BBT0110", message, field.keyword.span, None, before.keyword.span)
+
+    def get(self, kind: type[Field[_V_co]]) -> _V_co | None:
+        """The value of a kind of field, if it is given."""
+        field = self._found.get(kind)
+        return field.value if isinstance(field, kind) else None
+
+    def need(self, kind: type[Field[_V_co]], keyword: str, what: str, name: Token) -> _V_co:
+        """The value of a kind of field. Raises :class:`Misuse` if it is not given."""
+        value = self.get(kind)
+        if value is None:
+            raise Misuse("BBT0111", f"{what} lacks `{keyword}`", name.span)
+        return value
+
+    def parameters(self, close: Token) -> ast.TypedList:
+        """The parameters of a form that ends with a token."""
+        return parameters_of(self.get(Parameters) or (), close)
 
 
-def _expression(operand: Any) -> ast.NumericExpression | None:
-    """An operand as a numeric expression, if it is one."""
-    match operand:
-        case ast.Number() | ast.FluentRef() | ast.Arithmetic():
-            return operand
-        case ast.Name():
-            leaves.refuse_head(operand.text, operand.span, "a number or a numeric fluent")
-            return ast.FluentRef(operand, (), operand.span)
-        case _:
-            return None
-
-
-class Builder:
-    """Callbacks of the parser, named as the rules and their aliases. Each takes the list of children:
-    tokens as they are, rules as built."""
+class Builder(Expressions):
+    """Callbacks of the parser, named as the rules and their aliases."""
 
     # --- files and definitions ---------------------------------------------------------------
 
-    def document(self, children: list[Any]) -> tuple[ast.Definition, ...]:
-        return tuple(children)
+    def document(self, definitions: list[ast.Definition]) -> tuple[ast.Definition, ...]:
+        return tuple(definitions)
 
-    def domain(self, children: list[Any]) -> ast.Definition:
-        head, name, _, *sections, close = children
-        return ast.Definition("domain", leaves.name(name), tuple(sections), between(head, close))
-
-    def problem(self, children: list[Any]) -> ast.Definition:
-        head, name, _, *sections, close = children
-        return ast.Definition("problem", leaves.name(name), tuple(sections), between(head, close))
+    def definition(
+        self, head: Token, name: Token, _: Token, sections: list[ast.Section], close: Token
+    ) -> ast.Definition:
+        kind: Literal["domain", "problem"] = "domain" if head.kind == "DEFINE_DOMAIN" else "problem"
+        return ast.Definition(kind, leaves.name(name), tuple(sections), head.to(close))
 
     # --- declarations ------------------------------------------------------------------------
 
-    def requirements(self, children: list[Any]) -> ast.Requirements:
-        return ast.Requirements(tuple(map(leaves.name, children[1:-1])), between(children[0], children[-1]))
+    def requirements(self, head: Token, keys: list[Token], close: Token) -> ast.Requirements:
+        return ast.Requirements(tuple(map(leaves.name, keys)), head.to(close))
 
-    def types(self, children: list[Any]) -> ast.TypedSection:
-        return ast.TypedSection("types", children[1], between(children[0], children[-1]))
+    def typed_section(self, head: Token, entries: ast.TypedList, close: Token) -> ast.TypedSection:
+        return ast.TypedSection(_LISTS[head.kind], entries, head.to(close))
 
-    def constants(self, children: list[Any]) -> ast.TypedSection:
-        return ast.TypedSection("constants", children[1], between(children[0], children[-1]))
-
-    def objects(self, children: list[Any]) -> ast.TypedSection:
-        return ast.TypedSection("objects", children[1], between(children[0], children[-1]))
-
-    def typed_names(self, children: list[Any]) -> ast.TypedList:
-        groups: list[ast.TypedGroup] = []
-        names: tuple[ast.Term, ...] = ()
-        for child in children:
-            if not isinstance(child, Token):
-                types, span = child
-                groups.append(ast.TypedGroup(names, types, Span(span.source, names[0].span.start, span.end)))
-                names = ()
-            else:
-                names += tuple(leaves.terms(child.text, child.start, SOURCE.get()))
-        if names:
-            groups.append(ast.TypedGroup(names, (), _covering(names)))
-        return tuple(groups)
+    def typed_names(self, groups: list[ast.TypedGroup], *untyped: ast.TypedGroup) -> ast.TypedList:
+        """Its fast form is :meth:`names_flat`, for variables :meth:`variables_flat`."""
+        return (*groups, *untyped)
 
     typed_variables = typed_names
 
-    def names_flat(self, children: list[Any]) -> ast.TypedList:
-        return leaves.groups(children[0].text, children[0].start, variables=False)
+    def typed_group(self, runs: list[Token], types: Types) -> ast.TypedGroup:
+        group = self.untyped_group(runs)
+        span = Span(group.span.source, group.span.start, types.span.end)
+        return replace(group, types=types.names, span=span)
 
-    def variable_list(self, children: list[Any]) -> ast.TypedList:
-        return children[1]  # type: ignore[no-any-return]
+    def untyped_group(self, runs: list[Token]) -> ast.TypedGroup:
+        names = tuple(term for run in runs for term in leaves.terms(run.text, run.start, run.source))
+        return ast.TypedGroup(names, (), runs[0].to(runs[-1]))
 
-    def variables_flat(self, children: list[Any]) -> ast.TypedList:
-        token = children[0]
-        return leaves.groups(token.text[1:-1], token.start + 1, variables=True)
+    def names_flat(self, token: Token) -> ast.TypedList:
+        """The fast form of :meth:`typed_names`."""
+        return leaves.groups(token.text, token.start, token.source, variables=False)
 
-    def type(self, children: list[Any]) -> tuple[tuple[ast.Name, ...], Span]:
-        return (leaves.name(children[1]),), between(children[0], children[1])
+    def variable_list(self, _: Token, entries: ast.TypedList, _close: Token) -> ast.TypedList:
+        """Its fast form is :meth:`variables_flat`."""
+        return entries
 
-    def type_either(self, children: list[Any]) -> tuple[tuple[ast.Term, ...], Span]:
-        dash, _, *runs, close = children
+    def variables_flat(self, token: Token) -> ast.TypedList:
+        """The fast form of :meth:`variable_list`."""
+        return leaves.groups(token.text[1:-1], token.start + 1, token.source, variables=True)
+
+    def type(self, dash: Token, name: Token) -> Types:
+        return Types((leaves.name(name),), dash.to(name))
+
+    def type_either(self, dash: Token, _: Token, runs: list[Token], close: Token) -> Types:
         if not runs:
-            raise Misuse("BBT0101", "`(either)` names no type", between(dash, close))
-        return tuple(t for run in runs for t in leaves.terms(run.text, run.start, SOURCE.get())), between(
-            dash, close
-        )
+            raise Misuse("BBT0101", "`(either)` names no type", dash.to(close))
+        return Types(tuple(name for run in runs for name in leaves.names(run)), dash.to(close))
 
-    def predicates(self, children: list[Any]) -> ast.Predicates:
-        return ast.Predicates(tuple(children[1:-1]), between(children[0], children[-1]))
+    def predicates(self, head: Token, declarations: list[_Predicate], close: Token) -> ast.Predicates:
+        return ast.Predicates(tuple(declarations), head.to(close))
 
-    def predicate(self, children: list[Any]) -> ast.PredicateDeclaration:
-        head, parameters, close = children
-        name = leaves.declared("predicate", leaves.head_name(head))
-        return ast.PredicateDeclaration(name, parameters, False, between(head, close))
+    def predicate(self, head: Token, parameters: ast.TypedList, close: Token) -> _Predicate:
+        """Its fast form is :meth:`predicate_flat`."""
+        return _predicate(next(leaves.names(head)), parameters, head.to(close))
 
-    def predicate_equal(self, children: list[Any]) -> ast.PredicateDeclaration:
-        head, parameters, close = children
-        name = ast.Name("=", Span(SOURCE.get(), head.end - 1, head.end))
+    def predicate_flat(self, token: Token) -> _Predicate:
+        """The fast form of :meth:`predicate`."""
+        name = next(leaves.names(token))
+        end = name.span.end - token.start
+        parameters = leaves.groups(token.text[end:-1], token.start + end, token.source, variables=True)
+        return _predicate(name, parameters, token.span)
+
+    def predicate_equal(self, head: Token, parameters: ast.TypedList, close: Token) -> _Predicate:
+        name = ast.Name("=", Span(head.source, head.end - 1, head.end))
         if sum(len(group.names) for group in parameters) != 2:
-            raise Misuse(
-                "BBT0228", "a predicate cannot be called `=`", name.span, "it is built in, of two terms"
-            )
-        return ast.PredicateDeclaration(name, parameters, False, between(head, close))
+            message, hint = "a predicate cannot be called `=`", "it is built in, of two terms"
+            raise Misuse("BBT0228", message, name.span, hint)
+        return _predicate(name, parameters, head.to(close))
 
-    def predicate_flat(self, children: list[Any]) -> ast.PredicateDeclaration:
-        token = children[0]
-        found = _WORD.search(token.text, 1)
-        assert found is not None
-        start = token.start + found.start()
-        word = ast.Name(found.group(), Span(SOURCE.get(), start, start + len(found.group())))
-        name = leaves.declared("predicate", word)
-        entries = leaves.groups(token.text[found.end() : -1], token.start + found.end(), variables=True)
-        return ast.PredicateDeclaration(name, entries, False, of(token))
+    def predicate_unknown(
+        self, unknown: Token, head: Token, parameters: ast.TypedList, _: Token, close: Token
+    ) -> _Predicate:
+        return _predicate(next(leaves.names(head)), parameters, unknown.to(close), unknown=True)
 
-    def predicate_unknown(self, children: list[Any]) -> ast.PredicateDeclaration:
-        unknown, head, parameters, _, close = children
-        name = leaves.declared("predicate", leaves.head_name(head))
-        return ast.PredicateDeclaration(name, parameters, True, between(unknown, close))
+    def external(self, head: Token, predicate: _Predicate, close: Token) -> _Predicate:
+        return replace(predicate, external=True, span=head.to(close))
 
-    def external(self, children: list[Any]) -> ast.PredicateDeclaration:
-        predicate: ast.PredicateDeclaration = children[1]
-        return replace(predicate, external=True, span=between(children[0], children[2]))
+    def functions(self, head: Token, declarations: list[_Function], close: Token) -> ast.Functions:
+        return ast.Functions(tuple(declarations), head.to(close))
 
-    def functions(self, children: list[Any]) -> ast.Functions:
-        return ast.Functions(tuple(children[1:-1]), between(children[0], children[-1]))
+    def function(
+        self, head: Token, parameters: ast.TypedList, close: Token, types: Types | None = None
+    ) -> _Function:
+        return _function(next(leaves.names(head)), parameters, head.to(close), types)
 
-    def function(self, children: list[Any]) -> ast.FunctionDeclaration:
-        head, parameters, close, *types = children
-        span = between(head, close)
-        if types:
-            span = Span(span.source, span.start, types[0][1].end)
-        name = leaves.declared("function", leaves.head_name(head))
-        return ast.FunctionDeclaration(name, parameters, types[0][0] if types else (), span)
-
-    def function_bare(self, children: list[Any]) -> ast.FunctionDeclaration:
-        name, *types = children
-        span = of(name) if not types else Span(SOURCE.get(), name.start, types[0][1].end)
-        declared = leaves.declared("function", leaves.name(name))
-        return ast.FunctionDeclaration(declared, (), types[0][0] if types else (), span)
+    def function_bare(self, name: Token, types: Types | None = None) -> _Function:
+        return _function(leaves.name(name), (), name.span, types)
 
     # --- actions and the like ----------------------------------------------------------------
 
-    def action(self, children: list[Any]) -> ast.Action:
-        head, name, *given, close = children
-        fields = _fields(given)
+    def action(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Action:
+        fields = _Fields(given)
         return ast.Action(
             leaves.name(name),
-            _parameters(_value(fields, "parameters") or (), close),
-            _value(fields, "precondition"),
-            _value(fields, "observe"),
-            _value(fields, "effect"),
-            between(head, close),
+            fields.parameters(close),
+            fields.get(Condition),
+            fields.get(Observe),
+            fields.get(Effect),
+            head.to(close),
         )
 
-    def template(self, children: list[Any]) -> ast.Template:
-        head, name, *given, close = children
-        fields = _fields(given)
+    def template(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Template:
+        fields = _Fields(given)
         return ast.Template(
             leaves.declared("template", leaves.name(name)),
-            _parameters(_value(fields, "parameters") or (), close),
-            _value(fields, "precondition"),
-            _value(fields, "effect"),
-            _required(fields, "body", ":body", "the template", name),
-            between(head, close),
+            fields.parameters(close),
+            fields.get(Condition),
+            fields.get(Effect),
+            fields.need(Body, ":body", "the template", name),
+            head.to(close),
         )
 
-    def sensor(self, children: list[Any]) -> ast.Sensor:
-        head, name, *given, close = children
-        fields = _fields(given)
+    def sensor(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Sensor:
+        fields = _Fields(given)
         return ast.Sensor(
             leaves.name(name),
-            _parameters(_value(fields, "parameters") or (), close),
-            _value(fields, "condition"),
-            _required(fields, "sensed", ":sensed", "the sensor", name),
-            between(head, close),
+            fields.parameters(close),
+            fields.get(Condition),
+            fields.need(Sensed, ":sensed", "the sensor", name),
+            head.to(close),
         )
 
-    def parameters(self, children: list[Any]) -> Field:
-        return Field("parameters", *children)
-
-    def precondition(self, children: list[Any]) -> Field:
-        return Field("precondition", *children)
-
-    def effect(self, children: list[Any]) -> Field:
-        return Field("effect", *children)
-
-    def template_body(self, children: list[Any]) -> Field:
-        return Field("body", *children)
-
-    def sensor_condition(self, children: list[Any]) -> Field:
-        return Field("condition", *children)
-
-    def sensed(self, children: list[Any]) -> Field:
-        return Field("sensed", *children)
-
-    def observe(self, children: list[Any]) -> Field:
-        keyword, *parts = children
-        span = _covering(parts)
-        content = parts[0] if len(parts) == 1 else ast.And(tuple(parts), span)
-        return Field("observe", keyword, ast.Observation(content, span))
-
-    def observe_agent(self, children: list[Any]) -> Field:
-        message = "`:observe-agent`, an observation by one of several agents, is not supported"
-        raise Misuse("BBT0212", message, of(children[0]))
-
-    def derived(self, children: list[Any]) -> ast.Derived:
-        form, head, parameters, close, condition, end = children
-        parameters = _parameters(parameters, end)
-        args = tuple(name for group in parameters for name in group.names)
-        atom = ast.Atom(leaves.declared("predicate", leaves.head_name(head)), args, between(head, close))
-        kind: Any = "axiom" if form.kind == "AXIOM" else "derived"
-        return ast.Derived(
-            "derived" if kind == "axiom" else kind, parameters, atom, condition, between(form, end)
-        )
-
-    def axiom(self, children: list[Any]) -> ast.Derived:
-        head, *given, close = children
-        fields = _fields(given)
+    def axiom(self, head: Token, given: list[Field[object]], close: Token) -> ast.Derived:
+        fields = _Fields(given)
         return ast.Derived(
             "axiom",
-            _parameters(_value(fields, "parameters") or (), close),
-            _required(fields, "head", ":implies", "the axiom", head),
-            _required(fields, "context", ":context", "the axiom", head),
-            between(head, close),
+            fields.parameters(close),
+            fields.need(Implied, ":implies", "the axiom", head),
+            fields.need(Condition, ":context", "the axiom", head),
+            head.to(close),
         )
 
-    def axiom_parameters(self, children: list[Any]) -> Field:
-        return Field("parameters", *children)
+    parameters = axiom_parameters = Parameters
+    precondition = sensor_condition = axiom_context = Condition
+    effect = Effect
+    template_body = Body
+    sensed = Sensed
+    axiom_head = Implied
 
-    def axiom_context(self, children: list[Any]) -> Field:
-        return Field("context", *children)
+    def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
+        first, last = formulas[0].span, formulas[-1].span
+        span = Span(first.source, first.start, last.end)
+        content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
+        return Observe(keyword, ast.Observation(content, span))
 
-    def axiom_head(self, children: list[Any]) -> Field:
-        return Field("head", *children)
+    def observe_noisy(self, keyword: Token, content: ast.Probabilistic) -> Observe:
+        return Observe(keyword, ast.Observation(content, content.span))
+
+    def observe_agent(self, keyword: Token, _agent: Token, _formula: ast.Formula) -> Observe:
+        message = "`:observe-agent`, an observation by one of several agents, is not supported"
+        raise Misuse("BBT0212", message, keyword.span)
+
+    derived_head = DerivedHead
+
+    def derived(self, form: Token, head: DerivedHead, condition: ast.Formula, close: Token) -> ast.Derived:
+        parameters = parameters_of(head.parameters, close)
+        args = tuple(name for group in parameters for name in group.names)
+        name = leaves.declared("predicate", next(leaves.names(head.name)))
+        atom = ast.Atom(name, args, head.name.to(head.close))
+        return ast.Derived("derived", parameters, atom, condition, form.to(close))
 
     # --- problems ----------------------------------------------------------------------------
 
-    def domain_reference(self, children: list[Any]) -> ast.DomainReference:
-        head, name, close = children
-        return ast.DomainReference(leaves.name(name), between(head, close))
+    def domain_reference(self, head: Token, name: Token, close: Token) -> ast.DomainReference:
+        return ast.DomainReference(leaves.name(name), head.to(close))
 
-    def init(self, children: list[Any]) -> ast.Init:
-        return ast.Init(_spliced(children[1:-1]), between(children[0], children[-1]))
+    facts = staticmethod(leaves.facts)
 
-    def hidden(self, children: list[Any]) -> ast.Hidden:
-        facts = _spliced(children[1:-1])
-        for fact in facts:
+    def init(self, head: Token, elements: InitElements, close: Token) -> ast.Init:
+        return ast.Init(_spliced(elements), head.to(close))
+
+    def hidden(self, head: Token, elements: InitElements, close: Token) -> ast.Hidden:
+        facts: list[ast.Assign] = []
+        for fact in _spliced(elements):
             if not isinstance(fact, ast.Assign):
-                raise Misuse(
-                    "BBT0101",
-                    "`:hidden` holds facts only",
-                    fact.span,
-                    "each is `(p a)` or `(not (p a))`; numbers and what is uncertain stand in `:init`",
-                )
-        return ast.Hidden(facts, between(children[0], children[-1]))
+                hint = "each is `(p a)` or `(not (p a))`; numbers and what is uncertain stand in `:init`"
+                raise Misuse("BBT0101", "`:hidden` holds facts only", fact.span, hint)
+            facts.append(fact)
+        return ast.Hidden(tuple(facts), head.to(close))
 
-    def goal(self, children: list[Any]) -> ast.Goal:
-        head, *formula, close = children
-        whole = between(head, close)
-        return ast.Goal(formula[0] if formula else ast.Empty(whole), whole)
+    def goal(self, head: Token, formula: ast.Formula, close: Token) -> ast.Goal:
+        return ast.Goal(formula, head.to(close))
 
-    def goal_number(self, children: list[Any]) -> ast.GoalNumber:
-        head, number, close = children
-        kind: Any = head.kind.lower().replace("_", "-")
-        return ast.GoalNumber(kind, _number(number), between(head, close))
+    def goal_empty(self, head: Token, close: Token) -> ast.Goal:
+        return self.goal(head, ast.Empty(head.to(close)), close)
 
-    def metric(self, children: list[Any]) -> ast.Metric:
-        head, direction, operand, close = children
-        way: Any = direction.text.lower()
-        expression = _expression(operand)
+    def goal_number(self, head: Token, number: Token, close: Token) -> ast.GoalNumber:
+        return ast.GoalNumber(_GOALS[head.kind], self.number(number), head.to(close))
+
+    def metric(self, head: Token, direction: Token, operand: Operand, close: Token) -> ast.Metric:
+        expression = numeric(operand)
         if expression is None:
-            raise Misuse("BBT0101", "the metric is no numeric expression", between(head, close))
-        return ast.Metric(way, expression, between(head, close))
+            raise Misuse("BBT0101", "the metric is no numeric expression", head.to(close))
+        least = direction.text.lower() == "minimize"
+        return ast.Metric("minimize" if least else "maximize", expression, head.to(close))
 
-    def facts(self, children: list[Any]) -> list[ast.InitElement]:
-        return leaves.facts(children[0])
-
-    def fluent_value(self, children: list[Any]) -> ast.FluentValue | ast.Unsupported:
-        head, left, right, close = children
-        fluent = _expression(left)
+    def fluent_value(
+        self, head: Token, left: Operand, right: Operand, close: Token
+    ) -> ast.FluentValue | ast.Unsupported:
+        """Its fast form is part of :meth:`facts`."""
+        fluent = numeric(left)
         if isinstance(fluent, ast.FluentRef) and isinstance(right, ast.Number):
-            return ast.FluentValue(fluent, right, between(head, close))
-        return _unsupported("object fluent", head, close)
+            return ast.FluentValue(fluent, right, head.to(close))
+        return unsupported("object fluent", head, close)
 
-    def init_and(self, children: list[Any]) -> ast.InitAnd:
-        return ast.InitAnd(_spliced(children[1:-1]), between(children[0], children[-1]))
+    def init_and(self, head: Token, elements: InitElements, close: Token) -> ast.InitAnd:
+        return ast.InitAnd(_spliced(elements), head.to(close))
 
-    def init_or(self, children: list[Any]) -> ast.InitClause:
-        clause = self.disjunction(children)
-        return ast.InitClause(clause, clause.span)
+    def init_or(self, head: Token, parts: list[ast.Formula], close: Token) -> ast.InitClause:
+        return ast.InitClause(self.disjunction(head, parts, close), head.to(close))
 
-    def init_imply(self, children: list[Any]) -> ast.InitClause:
-        clause = self.implication(children)
-        return ast.InitClause(clause, clause.span)
+    def init_imply(self, head: Token, left: ast.Formula, right: ast.Formula, close: Token) -> ast.InitClause:
+        return ast.InitClause(self.implication(head, left, right, close), head.to(close))
 
-    def init_not(self, children: list[Any]) -> ast.InitClause | ast.Assign:
-        clause = self.negation(children)
-        if isinstance(clause.part, ast.Atom):
-            return leaves.assign(clause.part, Truth.FALSE, clause.span)
-        return ast.InitClause(clause, clause.span)
+    def init_not(self, head: Token, part: ast.Formula, close: Token) -> ast.InitClause | ast.Assign:
+        if isinstance(part, ast.Atom):
+            return leaves.assign(part, Truth.FALSE, head.to(close))
+        return ast.InitClause(self.negation(head, part, close), head.to(close))
 
-    def invariant(self, children: list[Any]) -> ast.Invariant:
-        return ast.Invariant(tuple(children[1:-1]), between(children[0], children[-1]))
+    def invariant(self, head: Token, parts: list[ast.Formula], close: Token) -> ast.Invariant:
+        return ast.Invariant(tuple(parts), head.to(close))
 
-    def timed_literal(self, children: list[Any]) -> ast.Unsupported:
-        return _unsupported("timed initial literal", children[0], children[-1])
-
-    # --- formulas ----------------------------------------------------------------------------
-
-    def flat(self, children: list[Any]) -> ast.Atom:
-        return leaves.flat(children[0])
-
-    def bare(self, children: list[Any]) -> ast.Atom:
-        return leaves.atom(children[0])
-
-    atom = bare
-
-    def negated(self, children: list[Any]) -> ast.Not:
-        return ast.Not(leaves.negated(children[0]), of(children[0]))
-
-    def empty(self, children: list[Any]) -> ast.Empty:
-        return ast.Empty(of(children[0]))
-
-    def negation(self, children: list[Any]) -> ast.Not:
-        head, part, close = children
-        return ast.Not(part, between(head, close))
-
-    def conjunction(self, children: list[Any]) -> ast.And:
-        return ast.And(tuple(children[1:-1]), between(children[0], children[-1]))
-
-    def literals(self, children: list[Any]) -> ast.And:
-        return ast.And(tuple(leaves.literals(children[0])), of(children[0]))
-
-    def equation(self, children: list[Any]) -> ast.Equality:
-        token: Token = children[0]
-        return leaves.equation(token.text, token.start)
-
-    def unequal(self, children: list[Any]) -> ast.Not:
-        token = children[0]
-        start = token.text.index("(", 1)
-        inner = token.text[start : token.text.index(")") + 1]
-        return ast.Not(leaves.equation(inner, token.start + start), of(token))
-
-    def disjunction(self, children: list[Any]) -> ast.Or:
-        return ast.Or(tuple(children[1:-1]), between(children[0], children[-1]))
-
-    def implication(self, children: list[Any]) -> ast.Imply:
-        head, premise, conclusion, close = children
-        return ast.Imply(premise, conclusion, between(head, close))
-
-    def quantified(self, children: list[Any]) -> ast.Quantified:
-        head, parameters, part, close = children
-        kind: Any = _keyword(head)
-        return ast.Quantified(kind, _parameters(parameters, close), part, between(head, close))
-
-    def test(self, children: list[Any]) -> ast.Test:
-        head, atom, close = children
-        kind: Any = _keyword(head)
-        return ast.Test(kind, atom, between(head, close))
-
-    def comparison(self, children: list[Any]) -> ast.Equality | ast.Unsupported:
-        head, left, right, close = children
-        if head.kind == "EQUAL":
-            numbers = isinstance(left, ast.Number) and isinstance(right, ast.Number)
-            sides = [ast.Name(s.text, s.span) if isinstance(s, ast.Number) else s for s in (left, right)]
-            terms = [isinstance(side, ast.Name | ast.Variable) for side in sides]
-            if all(terms) and not numbers:
-                return ast.Equality(sides[0], sides[1], between(head, close))
-            if any(isinstance(side, ast.Name | ast.Variable | ast.Unsupported) for side in (left, right)):
-                return _unsupported("object fluent", head, close)
-        return _unsupported("numeric comparison", head, close)
-
-    def preference(self, children: list[Any]) -> ast.Unsupported:
-        return _unsupported("preference", children[0], children[-1])
-
-    def trajectory(self, children: list[Any]) -> ast.Unsupported:
-        return _unsupported("trajectory constraint", children[0], children[-1])
-
-    def term(self, children: list[Any]) -> ast.Term:
-        token = children[0]
-        return ast.Variable(token.text, of(token)) if token.kind == "VARIABLE" else leaves.name(token)
-
-    # --- effects -----------------------------------------------------------------------------
-
-    def assign_flat(self, children: list[Any]) -> ast.Assign:
-        atom = leaves.flat(children[0])
-        return leaves.assign(atom, Truth.TRUE, atom.span)
-
-    def assign_bare(self, children: list[Any]) -> ast.Assign:
-        atom = leaves.atom(children[0])
-        return leaves.assign(atom, Truth.TRUE, atom.span)
-
-    def assign_negated(self, children: list[Any]) -> ast.Assign:
-        return leaves.assign(leaves.negated(children[0]), Truth.FALSE, of(children[0]))
-
-    def assign_not(self, children: list[Any]) -> ast.Assign:
-        head, atom, close = children
-        return leaves.assign(leaves.atom(atom), Truth.FALSE, between(head, close))
-
-    def assign_unknown(self, children: list[Any]) -> ast.Assign:
-        head, atom, close = children
-        return leaves.assign(atom, Truth.UNKNOWN, between(head, close))
-
-    def effect_and(self, children: list[Any]) -> ast.EffectAnd:
-        return ast.EffectAnd(tuple(children[1:-1]), between(children[0], children[-1]))
-
-    def effect_literals(self, children: list[Any]) -> ast.EffectAnd:
-        parts: list[ast.Effect] = []
-        for literal in leaves.literals(children[0]):
-            match literal:
-                case ast.Atom():
-                    parts.append(leaves.assign(literal, Truth.TRUE, literal.span))
-                case ast.Not(ast.Atom() as atom):
-                    parts.append(leaves.assign(atom, Truth.FALSE, literal.span))
-                case _:
-                    raise Misuse("BBT0101", "an effect cannot say `=`", literal.span, NOT_IN_EFFECT["="])
-        return ast.EffectAnd(tuple(parts), of(children[0]))
-
-    def when(self, children: list[Any]) -> ast.When:
-        head, condition, effect, close = children
-        return ast.When(condition, effect, between(head, close))
-
-    def effect_forall(self, children: list[Any]) -> ast.EffectForall:
-        head, parameters, effect, close = children
-        return ast.EffectForall(_parameters(parameters, close), effect, between(head, close))
-
-    def probabilistic(self, children: list[Any]) -> ast.Probabilistic:
-        return ast.Probabilistic(tuple(children[1:-1]), between(children[0], children[-1]))
-
-    def branch(self, children: list[Any]) -> ast.Branch:
-        number, effect = children
-        probability = _number(number)
-        return ast.Branch(probability, effect, Span(SOURCE.get(), number.start, effect.span.end))
-
-    def one_of(self, children: list[Any]) -> ast.OneOf:
-        return ast.OneOf(tuple(children[1:-1]), between(children[0], children[-1]))
-
-    def fluent_effect(self, children: list[Any]) -> ast.FluentEffect | ast.Unsupported:
-        head, target, amount, close = children
-        fluent, expression = _expression(target), _expression(amount)
-        if isinstance(fluent, ast.FluentRef) and expression is not None:
-            return ast.FluentEffect(_keyword(head), fluent, expression, between(head, close))
-        return _unsupported("object fluent", head, close)
-
-    # --- terms and numbers -------------------------------------------------------------------
-
-    def number(self, children: list[Any]) -> ast.Number:
-        return _number(children[0])
-
-    def fluent(self, children: list[Any]) -> ast.FluentRef:
-        return leaves.fluent(children[0])
-
-    def arithmetic(self, children: list[Any]) -> ast.Arithmetic | ast.Unsupported:
-        head, *operands, close = children
-        parts = [_expression(operand) for operand in operands]
-        if None in parts:
-            return _unsupported("arithmetic on objects", head, close)
-        return ast.Arithmetic(_keyword(head), tuple(p for p in parts if p), between(head, close))
-
-    def nested(self, children: list[Any]) -> ast.Unsupported:
-        """An atom whose arguments are no plain terms: an object fluent, or a misspelt keyword."""
-        word = _keyword(children[0])
-        near = nearest(word, CONNECTIVES)
-        if near is not None:
-            raise Misuse("BBT0101", f"`{word}` is no keyword", of(children[0]), f"did you mean `{near}`?")
-        return _unsupported("object fluent", children[0], children[-1])
+    def timed_literal(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
+        return unsupported("timed initial literal", head, close)
 
     # --- bodies ------------------------------------------------------------------------------
 
-    def body_control(self, children: list[Any]) -> ast.BodyControl:
-        kind: Any = _keyword(children[0])
-        return ast.BodyControl(kind, tuple(children[1:-1]), between(children[0], children[-1]))
+    def body_control(self, head: Token, children: list[ast.Body], close: Token) -> ast.BodyControl:
+        return ast.BodyControl(_CONTROLS[head.kind], tuple(children), head.to(close))
 
-    def body_condition(self, children: list[Any]) -> ast.BodyCondition:
-        head, formula, close = children
-        return ast.BodyCondition(formula, between(head, close))
+    def body_condition(self, head: Token, formula: ast.Formula, close: Token) -> ast.BodyCondition:
+        return ast.BodyCondition(formula, head.to(close))
 
-    def body_foreach(self, children: list[Any]) -> ast.BodyForeach:
-        head, parameters, child, close = children
-        return ast.BodyForeach(_parameters(parameters, close), child, between(head, close))
+    def body_foreach(
+        self, head: Token, parameters: ast.TypedList, child: ast.Body, close: Token
+    ) -> ast.BodyForeach:
+        return ast.BodyForeach(parameters_of(parameters, close), child, head.to(close))
 
-    def body_action(self, children: list[Any]) -> ast.BodyCall:
-        head, name, *args, close = children
-        terms = tuple(self.term([arg]) for arg in args)
-        return ast.BodyCall("action", leaves.name(name), terms, between(head, close))
+    def body_action(self, head: Token, name: Token, args: list[Token], close: Token) -> ast.BodyCall:
+        return ast.BodyCall("action", leaves.name(name), tuple(map(self.term, args)), head.to(close))
 
-    def body_call(self, children: list[Any]) -> ast.BodyCall:
-        atom = leaves.flat(children[0])
+    def body_call(self, token: Token) -> ast.BodyCall:
+        atom = leaves.flat(token)
         return ast.BodyCall(None, atom.predicate, atom.args, atom.span)
 
     # --- what is refused by name -------------------------------------------------------------
 
-    def sexpr(self, children: list[Any]) -> None:
-        """Nothing: what is refused keeps its text only."""
-
-    def unsupported_section(self, children: list[Any]) -> ast.Unsupported:
-        return _unsupported(_keyword(children[0]), children[0], children[-1])
+    def unsupported_section(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
+        return unsupported(keyword(head), head, close)
 
 
-def _spliced(children: Iterable[Any]) -> tuple[Any, ...]:
-    """Children in one tuple, runs of facts laid open."""
-    found: list[Any] = []
-    for child in children:
-        found.extend(child if isinstance(child, list) else [child])
+def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: bool = False) -> _Predicate:
+    return ast.PredicateDeclaration(leaves.declared("predicate", name), parameters, unknown, span)
+
+
+def _function(name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | None) -> _Function:
+    declared = leaves.declared("function", name)
+    if types is None:
+        return ast.FunctionDeclaration(declared, parameters, (), span)
+    whole = Span(span.source, span.start, types.span.end)
+    return ast.FunctionDeclaration(declared, parameters, types.names, whole)
+
+
+def _spliced(elements: InitElements) -> tuple[ast.InitElement, ...]:
+    """Elements in one tuple, runs of facts laid open."""
+    found: list[ast.InitElement] = []
+    for element in elements:
+        found.extend(element if isinstance(element, list) else [element])
     return tuple(found)

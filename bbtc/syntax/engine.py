@@ -12,23 +12,35 @@ import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
+from bbtc.source import SourceFile, Span
 from bbtc.syntax.tables import END, FLAGS, Production, Tables
 
 _SPACE = re.compile(r"\s*", FLAGS)
+_tuple = tuple.__new__
 
 
 class Token(NamedTuple):
-    """A terminal as it stands in the text, with its range of characters."""
+    """A terminal as it stands in a file, with its range of characters."""
 
     kind: str
     text: str
     start: int
     end: int
+    source: SourceFile
+
+    @property
+    def span(self) -> Span:
+        """Where it stands."""
+        return _tuple(Span, (self.source, self.start, self.end))
+
+    def to(self, last: Token) -> Span:
+        """The range from the start of this token to the end of another."""
+        return _tuple(Span, (self.source, self.start, last.end))
 
 
 # What completing a production does to the stack of values.
-_CALL, _SINGLE, _APPEND = range(3)
-_Reduction: TypeAlias = tuple[int, str, tuple[int, ...], Callable[[list[Any]], Any] | None, int]
+_CALL, _SINGLE, _LIST, _APPEND = range(4)
+_Reduction: TypeAlias = tuple[int, str, tuple[int, ...], Callable[..., object] | None, int]
 _Scanner: TypeAlias = Callable[[str, int], "re.Match[str] | None"]
 
 
@@ -47,8 +59,8 @@ class TooDeep(Exception):
 class Engine:
     """A parser for one grammar.
 
-    ``builder`` has a method for every rule or alias. The method takes the list of the rule's children:
-    tokens, and what the methods of other rules returned.
+    ``builder`` has a method for every rule or alias. The method takes the rule's children: tokens, what the
+    methods of other rules returned, and a list for ``item*`` or ``item+``.
     """
 
     def __init__(self, tables: Tables, builder: object) -> None:
@@ -60,15 +72,14 @@ class Engine:
         self._scanners: dict[int, _Scanner] = {}
         self._compiled: dict[frozenset[str], _Scanner] = {}
 
-    def parse(self, text: str, max_stack: int = sys.maxsize) -> Any:
-        """The value of the start rule for a text.
+    def parse(self, text: str, source: SourceFile, max_stack: int = sys.maxsize) -> Any:
+        """The value of the start rule for a text, whose characters stand where those of the source do.
 
         Raises :class:`Unexpected` for a syntax error, and :class:`TooDeep` where the stack of states
         would exceed ``max_stack``. Every form that is open takes at least one state.
         """
         actions, goto, reductions, scanners = self._actions, self._goto, self._reductions, self._scanners
-        make: Any = tuple.__new__
-        state, end = self._start, self._end
+        token_of, state, end = tuple.__new__, self._start, self._end
         states: list[int] = [state]
         values: list[Any] = []
         position = _SPACE.match(text).end()  # type: ignore[union-attr]
@@ -76,8 +87,8 @@ class Engine:
             match = (scanners.get(state) or self._scanner(state))(text, position)
             if match is not None:
                 kind: Any = match.lastgroup
-                first, last = match.span(match.lastindex or 0)
-                token = make(Token, (kind, text[first:last], first, last))
+                start, stop = match.span(match.lastindex or 0)
+                token = token_of(Token, (kind, text[start:stop], start, stop, source))
             elif position == len(text):
                 kind, token = END, None
             else:
@@ -88,7 +99,7 @@ class Engine:
                     raise Unexpected(position, states)
                 if action >= 0:
                     break
-                size, origin, splice, call, shape = reductions[-1 - action]
+                size, origin, empty, call, shape = reductions[-1 - action]
                 if shape == _APPEND:
                     # `list: list item` leaves the stack as it was before the item.
                     del states[-1]
@@ -98,14 +109,14 @@ class Engine:
                     continue
                 if shape == _SINGLE:
                     del states[-1]
-                elif size:
-                    children = values[-size:]
-                    del states[-size:], values[-size:]
-                    if splice:
-                        children = _laid_open(children, splice)
-                    values.append(children if call is None else call(children))
                 else:
-                    values.append([] if call is None else call([]))
+                    first = len(values) - size
+                    children = values[first:]
+                    del states[first + 1 :], values[first:]
+                    if empty:
+                        for at in empty:
+                            children.insert(at, [])
+                    values.append(children if call is None else call(*children))
                 state = goto[states[-1]][origin]
                 states.append(state)
                 if state == end and kind == END:
@@ -149,21 +160,7 @@ class Engine:
 
 
 def _reduction(production: Production, builder: object) -> _Reduction:
-    origin, size, splice, call, single, grows = production
-    if single:
-        return size, origin, splice, None, _SINGLE
-    if call is not None:
-        return size, origin, splice, getattr(builder, call), _CALL
-    return size, origin, splice, None, _APPEND if grows else _CALL
-
-
-def _laid_open(children: list[Any], splice: tuple[int, ...]) -> list[Any]:
-    """The children, with the lists among them replaced by their items."""
-    # A list rule is left-recursive: its list grows in place.
-    found: list[Any] = children[0] if splice[0] == 0 else [children[0]]
-    for at, child in enumerate(children[1:], 1):
-        if at in splice:
-            found.extend(child)
-        else:
-            found.append(child)
-    return found
+    origin, size, empty, call, single, grows = production
+    if call is None:
+        return size, origin, empty, None, _APPEND if grows else _LIST
+    return size, origin, empty, None if single else getattr(builder, call), _SINGLE if single else _CALL

@@ -6,7 +6,8 @@ import re
 from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
-from bbtc.syntax.scan import Fault
+from bbtc.diagnostics import Diagnostic
+from bbtc.source import SourceFile
 from bbtc.syntax.tables import END
 
 CONNECTIVES = (
@@ -136,6 +137,7 @@ def open_forms(text: str, position: int) -> list[Form]:
 class Place(NamedTuple):
     """Where the parser stopped."""
 
+    source: SourceFile
     text: str
     position: int
     accepted: Collection[str]
@@ -144,7 +146,7 @@ class Place(NamedTuple):
     """The keywords of each terminal."""
 
 
-def explain(place: Place) -> tuple[Fault, list[Form]]:
+def explain(place: Place) -> tuple[Diagnostic, list[Form]]:
     """The error at a place, and the forms around it."""
     forms = open_forms(place.text, place.position)
     special = _unheaded(place) or _misspelt(place, forms) or _overfull_not(place, forms)
@@ -161,10 +163,12 @@ def explain(place: Place) -> tuple[Fault, list[Form]]:
     message = f"expected {_expected(place.accepted, forms)}{_where(forms)}, found {shown}"
     hint = _misplaced(place, (head or found).lower()) or _near(place, head or found)
     hint = hint or _joined(place, found, forms)
-    return Fault("BBT0101", message, place.position, place.position + len(found), hint), forms
+    return Diagnostic(
+        "BBT0101", message, place.source.span(place.position, place.position + len(found)), hint
+    ), forms
 
 
-def _unheaded(place: Place) -> Fault | None:
+def _unheaded(place: Place) -> Diagnostic | None:
     """A definition that does not start with ``(domain name)`` or ``(problem name)``."""
     define = re.compile(r"\(\s*define\s*", re.IGNORECASE).match(place.text, place.position)
     if define is None or "DEFINE_DOMAIN" not in place.accepted:
@@ -174,10 +178,15 @@ def _unheaded(place: Place) -> Fault | None:
     near = nearest(found.lstrip("( "), ("domain", "problem"))
     message = f"expected `(domain name)` or `(problem name)`, found {f'`{found}`' if found else 'nothing'}"
     start = define.end() if found else place.position
-    return Fault("BBT0101", message, start, start + len(found), f"did you mean `({near}`?" if near else None)
+    return Diagnostic(
+        "BBT0101",
+        message,
+        place.source.span(start, start + len(found)),
+        f"did you mean `({near}`?" if near else None,
+    )
 
 
-def _misspelt(place: Place, forms: list[Form]) -> Fault | None:
+def _misspelt(place: Place, forms: list[Form]) -> Diagnostic | None:
     """A form whose first word is not quite a keyword."""
     if "SEQUENCE" in place.accepted:
         body = _ATOM_HEAD.match(place.text, place.position)
@@ -191,12 +200,15 @@ def _misspelt(place: Place, forms: list[Form]) -> Fault | None:
     near = None if field or word in known or word.startswith(":") else nearest(word, known)
     if near is None:
         return None
-    return Fault(
-        "BBT0101", f"`({word}` is no keyword", start, start + 1 + len(word), f"did you mean `({near}`?"
+    return Diagnostic(
+        "BBT0101",
+        f"`({word}` is no keyword",
+        place.source.span(start, start + 1 + len(word)),
+        f"did you mean `({near}`?",
     )
 
 
-def _overfull_not(place: Place, forms: list[Form]) -> Fault | None:
+def _overfull_not(place: Place, forms: list[Form]) -> Diagnostic | None:
     """An effect ``(not (p) (q))``: the grammar stops at the first atom, the mistake is the second."""
     if not forms or forms[-1].word != "not" or set(place.accepted) != {"NAME"}:
         return None
@@ -205,8 +217,11 @@ def _overfull_not(place: Place, forms: list[Form]) -> Fault | None:
     match = _FOUND.match(place.text, start)
     found = match.group() if match else ""
     message = f"an effect `(not …)` holds one atom, found `{found}`"
-    return Fault(
-        "BBT0101", message, start, start + len(found), "negate each atom, and join them with `(and …)`"
+    return Diagnostic(
+        "BBT0101",
+        message,
+        place.source.span(start, start + len(found)),
+        "negate each atom, and join them with `(and …)`",
     )
 
 
@@ -294,7 +309,7 @@ def _joined(place: Place, found: str, forms: list[Form]) -> str | None:
     return None
 
 
-def _bad_argument(place: Place, head: str) -> Fault | None:
+def _bad_argument(place: Place, head: str) -> Diagnostic | None:
     """The argument that keeps ``(p …)`` from being an atom."""
     if head.lower() in CONNECTIVES:
         return None
@@ -307,4 +322,4 @@ def _bad_argument(place: Place, head: str) -> Fault | None:
     shown = rest.group().replace(" ", "")
     message = f"expected names and variables in `({head}`, found `{shown}`"
     hint = "types stand in declarations only" if shown.startswith("-") else None
-    return Fault("BBT0101", message, rest.start(), rest.end(), hint)
+    return Diagnostic("BBT0101", message, place.source.span(rest.start(), rest.end()), hint)

@@ -8,10 +8,10 @@ all the rest.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextvars import ContextVar
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import TypeVar
 
+from bbtc.diagnostics import Diagnostic, Related, Unreadable
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
 from bbtc.syntax.ast import (
@@ -32,16 +32,15 @@ from bbtc.syntax.engine import Token
 from bbtc.syntax.scan import without_comments
 from bbtc.syntax.words import BODY_WORDS, FORM_WORDS
 
-SOURCE: ContextVar[SourceFile] = ContextVar("SOURCE")
-"""The file that is being parsed: the builder's functions keep no state, but spans need it."""
-
-_new: Any = object.__new__
-_tuple: Any = tuple.__new__
+_N = TypeVar("_N")
+_new: Callable[[type[_N]], _N] = object.__new__
+_tuple = tuple.__new__
 
 
-def _setter(node: type, slot: str) -> Any:
+def _setter(node: type, slot: str) -> Callable[[object, object], None]:
     """Writes a slot of a frozen node."""
-    return getattr(node, slot).__set__
+    write: Callable[[object, object], None] = getattr(node, slot).__set__
+    return write
 
 
 _name_text, _name_source, _name_start = (_setter(Name, s) for s in ("text", "_source", "_start"))
@@ -52,8 +51,8 @@ _atom_predicate, _atom_args, _atom_span = (_setter(Atom, s) for s in ("predicate
 _assign_atom, _assign_value, _assign_span = (_setter(Assign, s) for s in ("atom", "value", "span"))
 
 _WORD = re.compile(r"\??[^\s()?]+|\?")
+_GLUED = re.compile(r"[^ ]\?|\?(?: |$)")
 _LITERAL = re.compile(r"\(([^()]*)\)|\(\s*not\s*(\([^()]*\))\s*\)", re.IGNORECASE)
-_ENTRY = re.compile(r"\??[^\s()?]+|\?")
 _TOKEN = re.compile(r"[()]|[^\s()]+")
 # A fact whose words stand one space apart, any fact, or the value of a fluent.
 _FACT = re.compile(r"\(([^\s()]+(?: [^\s()]+)*)\)|(\([^()]*\))|\(\s*=\s*(\([^()]*\))\s*([^\s()]+)\s*\)")
@@ -66,29 +65,33 @@ _EXPONENT = re.compile(r"e[-+]?0*([0-9]+)$", re.IGNORECASE)
 _ZERO_DENOMINATOR = re.compile(r"/0+$")
 
 
-class Misuse(Exception):
+class Misuse(Unreadable):
     """A form that fits the grammar's rules one by one but not together; reported like a syntax error."""
 
     def __init__(
         self, code: str, message: str, span: Span, hint: str | None = None, first: Span | None = None
     ) -> None:
-        super().__init__(message)
-        self.code, self.message, self.span, self.hint, self.first = code, message, span, hint, first
-
-
-def of(token: Token) -> Span:
-    """The span of a token."""
-    return _tuple(Span, (SOURCE.get(), token.start, token.end))  # type: ignore[no-any-return]
-
-
-def between(first: Token, last: Token) -> Span:
-    """The span from the start of one token to the end of another."""
-    return _tuple(Span, (SOURCE.get(), first.start, last.end))  # type: ignore[no-any-return]
+        related = (Related("first given here", first),) if first else ()
+        super().__init__(Diagnostic(code, message, span, hint, related=related))
 
 
 def name(token: Token) -> Name:
     """The symbol a token holds."""
-    return Name(token.text, of(token))
+    return Name(token.text, token.span)
+
+
+def _term(word: str, at: int, source: SourceFile) -> Term:
+    if word[0] == "?":
+        variable = _new(Variable)
+        _variable_text(variable, word)
+        _variable_source(variable, source)
+        _variable_start(variable, at)
+        return variable
+    node = _new(Name)
+    _name_text(node, word)
+    _name_source(node, source)
+    _name_start(node, at)
+    return node
 
 
 def terms(text: str, offset: int, source: SourceFile) -> list[Term]:
@@ -98,8 +101,7 @@ def terms(text: str, offset: int, source: SourceFile) -> list[Term]:
     """
     # The usual way to write an atom is one space between words, which str.split takes apart fast.
     # Other white space and `robot?r` take the slow path.
-    glued = text.count("?") - text.count(" ?") - (text[0] == "?")
-    if glued or not text.isprintable() or " -" in text or "? " in text or text[-1] == "?":
+    if not text.isprintable() or " -" in text or ("?" in text and _GLUED.search(text)):
         return _terms_slowly(text, offset, source)
     found: list[Term] = []
     at = offset
@@ -107,17 +109,7 @@ def terms(text: str, offset: int, source: SourceFile) -> list[Term]:
         if not word:
             at += 1
             continue
-        if word[0] == "?":
-            node = _new(Variable)
-            _variable_text(node, word)
-            _variable_source(node, source)
-            _variable_start(node, at)
-        else:
-            node = _new(Name)
-            _name_text(node, word)
-            _name_source(node, source)
-            _name_start(node, at)
-        found.append(node)
+        found.append(_term(word, at, source))
         at += len(word) + 1
     return found
 
@@ -137,7 +129,7 @@ def _terms_slowly(text: str, offset: int, source: SourceFile) -> list[Term]:
 def _flat(inner: str, span: Span) -> Atom:
     """The atom ``(inner)`` that stands at a span."""
     words = terms(inner, span[1] + 1, span[0])
-    node: Atom = _new(Atom)
+    node = _new(Atom)
     _atom_predicate(node, words[0])
     _atom_args(node, tuple(words[1:]))
     _atom_span(node, span)
@@ -146,7 +138,7 @@ def _flat(inner: str, span: Span) -> Atom:
 
 def flat(token: Token) -> Atom:
     """The atom of a token ``(p a ?x)``."""
-    return _flat(token.text[1:-1], of(token))
+    return _flat(token.text[1:-1], token.span)
 
 
 def atom(token: Token) -> Atom:
@@ -154,14 +146,15 @@ def atom(token: Token) -> Atom:
     printing would turn into a form."""
     if token.kind == "FLAT":
         return flat(token)
-    refuse_head(token.text, of(token), "a condition or an effect")
-    return Atom(name(token), (), of(token))
+    refuse_head(token.text, token.span, "a condition or an effect")
+    return Atom(name(token), (), token.span)
 
 
-def head_name(head: Token) -> Name:
-    """The name in a ``(name`` terminal."""
-    text = head.text[1:].strip()
-    return Name(text, Span(SOURCE.get(), head.end - len(text), head.end))
+def names(run: Token) -> Iterator[Name]:
+    """The symbols of a run of them; the first one, also of ``(name`` and ``(name ?x - t)``."""
+    for match in _WORD.finditer(run.text):
+        start, end = match.span()
+        yield Name(match.group(), Span(run.source, run.start + start, run.start + end))
 
 
 def declared(kind: str, word: Name) -> Name:
@@ -185,18 +178,12 @@ def negated(token: Token) -> Atom:
     opening = token.text.index("(", 1)
     inner = token.text[opening + 1 : token.text.index(")")]
     start = token.start + opening
-    return _flat(inner, Span(SOURCE.get(), start, start + len(inner) + 2))
-
-
-def fluent(token: Token) -> FluentRef:
-    """The fluent of a token ``(f a)`` or ``f``."""
-    found = atom(token)
-    return FluentRef(found.predicate, found.args, found.span)
+    return _flat(inner, Span(token.source, start, start + len(inner) + 2))
 
 
 def assign(fact: Atom, value: Truth, span: Span) -> Assign:
     """The assignment of a value to an atom."""
-    node: Assign = _new(Assign)
+    node = _new(Assign)
     _assign_atom(node, fact)
     _assign_value(node, value)
     _assign_span(node, span)
@@ -205,14 +192,14 @@ def assign(fact: Atom, value: Truth, span: Span) -> Assign:
 
 def facts(run: Token) -> list[InitElement]:
     """The elements of a run of ground facts ``(p a)`` and values ``(= (f a) 3)``."""
-    source, base, true = SOURCE.get(), run.start, Truth.TRUE
+    source, base, true = run.source, run.start, Truth.TRUE
     plain = "?" not in run.text and " -" not in run.text
     found: list[InitElement] = []
     for match in _FACT.finditer(run.text):
         start, end = match.span()
         span = _tuple(Span, (source, base + start, base + end))
         if match[1] is not None and plain:
-            words: list[Any] = []
+            words: list[Name] = []
             at = base + start + 1
             for word in match[1].split(" "):
                 node = _new(Name)
@@ -225,11 +212,11 @@ def facts(run: Token) -> list[InitElement]:
             _atom_predicate(fact, words[0])
             _atom_args(fact, tuple(words[1:]))
             _atom_span(fact, span)
-            node = _new(Assign)
-            _assign_atom(node, fact)
-            _assign_value(node, true)
-            _assign_span(node, span)
-            found.append(node)
+            element = _new(Assign)
+            _assign_atom(element, fact)
+            _assign_value(element, true)
+            _assign_span(element, span)
+            found.append(element)
         elif match[4] is None:
             found.append(assign(_flat(match.group()[1:-1], span), true, span))
         else:
@@ -240,37 +227,36 @@ def facts(run: Token) -> list[InitElement]:
     return found
 
 
-def equation(text: str, offset: int) -> Equality:
+def equation(text: str, offset: int, source: SourceFile) -> Equality:
     """The equation ``(= a ?x)`` at an offset."""
     sign = text.index("=") + 1
-    left, right = terms(text[sign:-1], offset + sign, SOURCE.get())
-    return Equality(left, right, Span(SOURCE.get(), offset, offset + len(text)))
+    left, right = terms(text[sign:-1], offset + sign, source)
+    return Equality(left, right, Span(source, offset, offset + len(text)))
 
 
 def literals(token: Token) -> Iterator[Atom | Equality | Not]:
     """The parts of a token ``(and (p a) (not (q b)) (= a ?x))``."""
-    source, base, text = SOURCE.get(), token.start, token.text
+    source, base, text = token.source, token.start, token.text
     for match in _LITERAL.finditer(text, text.index("(", 1)):
         start, end = match.span()
         span = _tuple(Span, (source, base + start, base + end))
         if match[2] is None:
             inner = match[1]
-            yield equation(match.group(), base + start) if inner.lstrip()[0] == "=" else _flat(inner, span)
+            yield equation(match.group(), base + start, source) if "=" in inner else _flat(inner, span)
             continue
         inner, at = match[2], base + match.start(2)
-        if inner[1:].lstrip()[0] == "=":
-            yield Not(equation(inner, at), span)
+        if "=" in inner:
+            yield Not(equation(inner, at, source), span)
         else:
             yield Not(_flat(inner[1:-1], Span(source, at, at + len(inner))), span)
 
 
-def groups(text: str, offset: int, *, variables: bool) -> tuple[TypedGroup, ...]:
+def groups(text: str, offset: int, source: SourceFile, *, variables: bool) -> tuple[TypedGroup, ...]:
     """The groups of a typed list ``a b - t c``, of variables or of names.
 
     Raises :class:`Misuse` where a hyphen has no names before it or no type after it, and for a name
     among variables.
     """
-    source = SOURCE.get()
     found: list[TypedGroup] = []
     names: list[Term] = []
     start, typed = offset, False
@@ -299,7 +285,7 @@ def groups(text: str, offset: int, *, variables: bool) -> tuple[TypedGroup, ...]
 def _entries(text: str, offset: int, *, variables: bool) -> Iterator[tuple[str, int]]:
     """The words of a typed list and where they stand. Among variables, a hyphen may lack its spaces, for what
     has no question mark can only be a type: `?x- block`, `?x -block`."""
-    found = [(match.group(), offset + match.start()) for match in _ENTRY.finditer(text)]
+    found = [(match.group(), offset + match.start()) for match in _WORD.finditer(text)]
     if not variables or "-" not in text:
         yield from found
         return
@@ -322,16 +308,7 @@ def _entry(word: str, at: int, source: SourceFile, variables: bool) -> Term:
         what = "a parameter `?x`" if variables else "a name"
         hint = f"write `?{word}` for a parameter, `- {word}` for a type" if variables else None
         raise Misuse("BBT0101", f"expected {what}, found `{word}`", Span(source, at, at + len(word)), hint)
-    node = _new(Variable if variables else Name)
-    if variables:
-        _variable_text(node, word)
-        _variable_source(node, source)
-        _variable_start(node, at)
-    else:
-        _name_text(node, word)
-        _name_source(node, source)
-        _name_start(node, at)
-    return node  # type: ignore[no-any-return]
+    return _term(word, at, source)
 
 
 def number(text: str, span: Span) -> Number:
@@ -348,6 +325,5 @@ def number(text: str, span: Span) -> Number:
 
 def plain_text(first: Token, last: Token) -> str:
     """The source from one token to another on one line, without comments."""
-    source = SOURCE.get()
-    words = " ".join(_TOKEN.findall(without_comments(source.text[first.start : last.end])))
+    words = " ".join(_TOKEN.findall(without_comments(first.to(last).text)))
     return words.replace("( ", "(").replace(" )", ")")

@@ -10,7 +10,7 @@ from bbtc.source import SourceFile, Span
 from bbtc.syntax import ast, scan
 from bbtc.syntax.build import Builder
 from bbtc.syntax.engine import Engine, TooDeep, Unexpected
-from bbtc.syntax.leaves import SOURCE, Misuse
+from bbtc.syntax.leaves import Misuse
 from bbtc.syntax.recover import recovered
 from bbtc.syntax.tables import tables
 
@@ -37,13 +37,9 @@ def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast
             "BBT0005", f"parentheses are nested more than {max_depth} deep", Span(source, deep, deep + 1)
         )
         return ast.Document(source)
-    token = SOURCE.set(source)
-    try:
-        with collector_paused():
-            definitions = _definitions(text, source, report, max_depth)
-            comments = scan.comments(source)
-    finally:
-        SOURCE.reset(token)
+    with collector_paused():
+        definitions = _definitions(text, source, report, max_depth)
+        comments = scan.comments(source)
     if not definitions and not report.errors:
         report.error("BBT0003", f"{source.name} holds no domain and no problem")
     return ast.Document(source, definitions, comments)
@@ -52,7 +48,7 @@ def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast
 def _definitions(text: str, source: SourceFile, report: Report, max_depth: int) -> tuple[ast.Definition, ...]:
     try:
         # Every form that is open has a state on the stack: in a shallow stack nothing is too deep.
-        return _engine().parse(text, max_depth)  # type: ignore[no-any-return]
+        return _engine().parse(text, source, max_depth)  # type: ignore[no-any-return]
     except (TooDeep, Unexpected, Misuse):
         deep = scan.too_deep(text, max_depth)
     if deep is not None:
@@ -61,6 +57,6 @@ def _definitions(text: str, source: SourceFile, report: Report, max_depth: int) 
         )
         return ()
     try:
-        return _engine().parse(text)  # type: ignore[no-any-return]
+        return _engine().parse(text, source)  # type: ignore[no-any-return]
     except (Unexpected, Misuse):
         return recovered(text, source, report, _engine())

@@ -25,16 +25,6 @@ def print_document(document: ast.Document) -> str:
     return Setter(document.comments).run(Doc("", definitions, span=whole, broken=True, airy=True))
 
 
-def print_formula(formula: ast.Formula) -> str:
-    """A formula on one line."""
-    return _Docs("").formula(formula).flat
-
-
-def print_effect(effect: ast.Effect) -> str:
-    """An effect on one line."""
-    return _Docs("").effect(effect).flat
-
-
 class _Docs:
     """Makes the forms of nodes. ``text`` is the source without comments; it is empty for nodes that
     come from nowhere, whose words then have no places."""

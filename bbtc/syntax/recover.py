@@ -11,13 +11,13 @@ from __future__ import annotations
 import re
 
 from bbtc.diagnostics import Diagnostic, Related, Report, Severity
-from bbtc.source import SourceFile, Span
+from bbtc.source import SourceFile
 from bbtc.syntax import ast
 from bbtc.syntax.balance import Balance
 from bbtc.syntax.engine import Engine, Unexpected
 from bbtc.syntax.hints import Form, Place, explain, keywords, open_forms
 from bbtc.syntax.leaves import Misuse
-from bbtc.syntax.scan import Fault, blank, foreign_characters
+from bbtc.syntax.scan import blank, foreign_characters
 
 MAX_ERRORS = 20
 """Syntax errors reported for one file."""
@@ -34,9 +34,9 @@ def recovered(text: str, source: SourceFile, report: Report, engine: Engine) -> 
     """What can be read of a text with errors (comments blanked); the errors go to the report."""
     recovery = _Recovery(text, source, engine)
     definitions = recovery.run()
-    faults = sorted(recovery.faults, key=lambda fault: fault.start)
-    for fault in faults[:MAX_ERRORS]:
-        report.add(_diagnostic(fault, source))
+    faults = sorted(recovery.faults, key=_start)
+    for each in faults[:MAX_ERRORS]:
+        report.add(each)
     if len(faults) >= MAX_ERRORS:
         message = f"only the first {MAX_ERRORS} syntax errors of {source.name} are shown"
         report.add(Diagnostic("BBT0101", message, severity=Severity.NOTE))
@@ -47,74 +47,77 @@ class _Recovery:
     """The faults of a text, gathered step by step."""
 
     def __init__(self, text: str, source: SourceFile, engine: Engine) -> None:
-        self._engine = engine
+        self._source, self._engine = source, engine
         self._keywords = keywords(engine.terminals)
-        self._foreign, text = foreign_characters(text)
-        self._balance = Balance(text).run()
+        self._foreign, text = foreign_characters(text, source)
+        self._balance = Balance(text, source).run()
         # A quotation mark or the like may well be followed by a parenthesis that is none of the language's.
-        lines = {source.position(fault.start)[0] for fault in self._foreign}
-        counted = [f for f in self._balance.faults if source.position(f.start)[0] not in lines]
+        lines = {source.position(_start(each))[0] for each in self._foreign}
+        counted = [each for each in self._balance.faults if source.position(_start(each))[0] not in lines]
         self.faults = [*self._foreign, *counted]
         self._blanked: list[int] = []
 
     def run(self) -> tuple[ast.Definition, ...]:
         """Parse until the text has no further error, or too many."""
-        edited = bytearray(self._balance.text, "ascii")
+        source, edited = self._source, bytearray(self._balance.text, "ascii")
         work = 0
         while len(self.faults) < MAX_ERRORS and work <= _RECOVERY_CHARACTERS:
             text = edited.decode("ascii")
             work += len(text)
             try:
-                return self._engine.parse(text)  # type: ignore[no-any-return]
+                return self._engine.parse(text, self._source)  # type: ignore[no-any-return]
             except Unexpected as error:
-                place = Place(text, error.position, self._engine.accepted(error.stack), self._keywords)
-                fault, forms = explain(place)
+                place = Place(
+                    source, text, error.position, self._engine.accepted(error.stack), self._keywords
+                )
+                found, forms = explain(place)
                 start, end = self._part(place, forms)
             except Misuse as error:
-                at = error.span.start
-                fault, forms = _misuse(error), open_forms(text, at)
-                start, end = self._part(Place(text, at, (), self._keywords), forms)
-            self._note(fault, text, forms)
+                at = _start(error.diagnostic)
+                found, forms = error.diagnostic, open_forms(text, at)
+                start, end = self._part(Place(source, text, at, (), self._keywords), forms)
+            self._note(found, text, forms)
             if not text[start:end].strip():
                 break
             self._blanked.append(start)
             blank(edited, start, end)
         return ()
 
-    def _note(self, fault: Fault, text: str, forms: list[Form]) -> None:
+    def _note(self, found: Diagnostic, text: str, forms: list[Form]) -> None:
         """Keep a fault, unless it follows from one that is known."""
-        if any(fault.start <= f.end and f.start <= fault.end for f in self._foreign):
+        if any(_start(found) <= _end(each) and _start(each) <= _end(found) for each in self._foreign):
             return
-        if fault.code == "BBT0111" and len(forms) > 1:
+        if found.code == "BBT0111" and len(forms) > 1:
             # A part is missing, maybe because it was blanked.
             section = range(forms[1].start, _form_end(text, forms[1].start))
             if any(start in section for start in self._blanked):
                 return
-        if not self._left_outside(fault):
-            self.faults.append(fault)
+        if not self._left_outside(found):
+            self.faults.append(found)
 
-    def _left_outside(self, fault: Fault) -> bool:
+    def _left_outside(self, found: Diagnostic) -> bool:
         """Settle an error with what the count of parentheses showed at the end of its section.
 
         If a form is left outside by a parenthesis too many, that one stands right before the form.
         Any other error explains the count, which then needs no message of its own.
         """
-        before = self._balance.text[: fault.start].rstrip()
-        form = self._balance.text.startswith("(", fault.start)
+        at = _start(found)
+        before = self._balance.text[:at].rstrip()
+        form = self._balance.text.startswith("(", at)
         ends = [self._balance.open_end] if self._balance.open_end else []
         for shown in (*self._balance.extras, *ends):
             known = self._balance.faults[shown.fault]
-            if known not in self.faults or not shown.section <= fault.start < shown.start:
+            if known not in self.faults or not shown.section <= at < shown.start:
                 continue
             if known.code == "BBT0102" or not form or not before.endswith(")"):
                 self.faults.remove(known)
                 return False
-            self.faults[self.faults.index(known)] = known._replace(
-                message="this parenthesis closes its form too early",
-                start=len(before) - 1,
-                end=len(before),
-                hint="remove it",
-                related=("this is left outside", fault.start, fault.end),
+            self.faults[self.faults.index(known)] = Diagnostic(
+                known.code,
+                "this parenthesis closes its form too early",
+                self._source.span(len(before) - 1, len(before)),
+                "remove it",
+                related=(Related("this is left outside", found.span),),
             )
             return True
         return False
@@ -171,16 +174,9 @@ def _form_end(text: str, start: int) -> int:
     return len(text)
 
 
-def _misuse(error: Misuse) -> Fault:
-    _, start, end = error.span
-    related = ("first given here", error.first.start, error.first.end) if error.first else None
-    return Fault(error.code, error.message, start, end, error.hint, related)
+def _start(found: Diagnostic) -> int:
+    return found.span.start if found.span else 0
 
 
-def _diagnostic(fault: Fault, source: SourceFile) -> Diagnostic:
-    related: tuple[Related, ...] = ()
-    if fault.related:
-        message, start, end = fault.related
-        related = (Related(message, Span(source, start, end)),)
-    span = Span(source, min(fault.start, len(source.text)), min(fault.end, len(source.text)))
-    return Diagnostic(fault.code, fault.message, span, fault.hint, Severity.ERROR, related)
+def _end(found: Diagnostic) -> int:
+    return found.span.end if found.span else 0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from itertools import accumulate
-from typing import NamedTuple
 
+from bbtc.diagnostics import Diagnostic
 from bbtc.source import SourceFile, Span
 from bbtc.syntax.ast import Comment
 
@@ -13,17 +13,6 @@ _COMMENT = re.compile(r";[^\r\n]*")
 _NOT_PARENTHESES = re.compile(r"[^()]+")
 _STEP = {"(": 1, ")": -1}
 _FOREIGN = re.compile(r"[^ \t\r\n\f\v()a-zA-Z0-9_.*+@#$%!~?:=<>/-]+")
-
-
-class Fault(NamedTuple):
-    """An error found in a text: code, message, range, hint, and a second place with its message."""
-
-    code: str
-    message: str
-    start: int
-    end: int
-    hint: str | None = None
-    related: tuple[str, int, int] | None = None
 
 
 def comments(source: SourceFile) -> tuple[Comment, ...]:
@@ -66,7 +55,7 @@ _MEANT = {
 """What to write for characters that word processors and pages put in, and for commas."""
 
 
-def foreign_characters(text: str) -> tuple[list[Fault], str]:
+def foreign_characters(text: str, source: SourceFile) -> tuple[list[Diagnostic], str]:
     """The places where characters stand that the language does not use, and the text with an
     underscore for each of these."""
     faults = []
@@ -74,7 +63,7 @@ def foreign_characters(text: str) -> tuple[list[Fault], str]:
         shown = repr(match.group()[:10])
         what = f"characters {shown}" if len(match.group()) > 1 else f"character {shown}"
         hint = _MEANT.get(match.group(), "names hold letters, digits and _ - . * + @ # $ % ! ~")
-        faults.append(Fault("BBT0104", f"{what} cannot stand here", *match.span(), hint))
+        faults.append(Diagnostic("BBT0104", f"{what} cannot stand here", source.span(*match.span()), hint))
     return faults, _FOREIGN.sub(lambda match: "_" * len(match.group()), text) if faults else text
 
 

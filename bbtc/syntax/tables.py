@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -30,15 +30,15 @@ class Production(NamedTuple):
 
     origin: str
     size: int
-    splice: tuple[int, ...]
-    """Positions of the children that are lists to be laid open: those of rules whose name starts
-    with ``_``."""
+    empty: tuple[int, ...]
+    """Positions of the lists that are empty: Lark makes two productions of ``OR formula* CLOSE``, with the
+    list and without it, and both must have the same children."""
     call: str | None
-    """Name of the builder's method; None for a list to be laid open."""
+    """Name of the builder's method; None for a list."""
     single: bool
     """A single child stands for the whole (``?rule``)."""
     grows: bool
-    """A list rule of the form ``list: list item``."""
+    """A list of the form ``list: list item``; others are ``list: item``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,9 +99,8 @@ def make_tables(grammar: str, start: str) -> Tables:
     table = data["parser"]["parser"]
     terminals = sorted(lark.terminals, key=lambda t: (-t.priority, -len(t.pattern.to_regexp()), t.name))
     kinds = {terminal.name for terminal in terminals} | {END}
-    rules: dict[int, Production] = {
-        number: _production(rule) for number, rule in memo.items() if rule["__type__"] == "Rule"
-    }
+    written = {number: rule for number, rule in memo.items() if rule["__type__"] == "Rule"}
+    rules = {number: _production(rule, written.values()) for number, rule in written.items()}
     # Lark numbers rules and states as its sets happen to be ordered.
     order = sorted(rules, key=lambda number: (rules[number].origin, _expansion(memo[number])))
     position = {number: at for at, number in enumerate(order)}
@@ -152,15 +151,19 @@ def _expansion(rule: Mapping[str, Any]) -> list[str]:
     return [symbol["name"] for symbol in rule["expansion"]]
 
 
-def _production(rule: Mapping[str, Any]) -> Production:
-    origin = rule["origin"]["name"]
+def _production(rule: Mapping[str, Any], rules: Iterable[Mapping[str, Any]]) -> Production:
+    origin, alias = rule["origin"]["name"], rule["alias"]
     expansion = _expansion(rule)
-    splice = tuple(at for at, name in enumerate(expansion) if name.startswith("_"))
-    alias = rule["alias"]
-    single = bool(rule["options"]["expand1"]) and len(expansion) == 1 and alias is None and not splice
-    call = None if origin.startswith("_") else alias or origin
-    grows = call is None and splice == (0,) and len(expansion) == 2 and expansion[0] == origin
-    return Production(origin, len(expansion), splice, call, single, grows)
+    if origin.startswith("_"):
+        return Production(origin, len(expansion), (), None, False, expansion[0] == origin)
+    single = bool(rule["options"]["expand1"]) and len(expansion) == 1 and alias is None
+    empty: tuple[int, ...] = ()
+    for other in (_expansion(each) for each in rules if each["origin"] == rule["origin"]):
+        # An underscore marks the names of the rules that Lark makes for `item*` and `item+`.
+        lists = tuple(at for at, name in enumerate(other) if name.startswith("_"))
+        if lists and expansion == [name for name in other if not name.startswith("_")]:
+            empty = lists
+    return Production(origin, len(expansion), empty, alias or origin, single, False)
 
 
 # --- text ------------------------------------------------------------------------------------
@@ -190,8 +193,8 @@ def _loaded(found: Mapping[str, Any]) -> Tables:
         found["start"],
         found["end"],
         tuple(
-            Production(origin, size, tuple(splice), call, single, grows)
-            for origin, size, splice, call, single, grows in found["productions"]
+            Production(origin, size, tuple(empty), call, single, grows)
+            for origin, size, empty, call, single, grows in found["productions"]
         ),
         dict(enumerate(found["actions"])),
         dict(enumerate(found["goto"])),

@@ -6,7 +6,7 @@ child may contain actions; :func:`bbtc.tree.validate.check_tree` enforces it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal, TypeAlias
@@ -37,6 +37,16 @@ class ControlNode:
     template: str | None = None
     reason: str | None = None
     attempts: int | None = None
+
+    def __reduce__(self) -> tuple[Callable[..., Node], tuple[object, ...]]:
+        """Pickled node by node: a pickler's recursion ends at fewer levels than a tree may have."""
+        nodes = [
+            (n.id, n.kind, len(n.children), n.name, n.template, n.reason, n.attempts)
+            if isinstance(n, ControlNode)
+            else n
+            for n in walk(self)
+        ]
+        return _put_together, tuple(nodes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +81,8 @@ class ActionNode:
 
 Node: TypeAlias = ControlNode | ConditionNode | ActionNode
 
-Status: TypeAlias = Literal["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
+PlanStatus: TypeAlias = Literal["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
+"""How planning ended. What a node returns at a tick is a :class:`bbtc.belief.tick.NodeStatus`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +97,7 @@ class Tree:
     root: Node
     success_probability: Fraction
     target: Fraction
-    status: Status
+    status: PlanStatus
     bounds: tuple[Fraction, Fraction] | None = None
 
     def _repr_svg_(self) -> str | None:
@@ -107,6 +118,23 @@ def walk(node: Node) -> Iterator[Node]:
                 pass
             case _:
                 assert_never(node)
+
+
+_Entry: TypeAlias = tuple[str, ControlKind, int, str | None, str | None, str | None, int | None]
+
+
+def _put_together(*nodes: _Entry | ConditionNode | ActionNode) -> Node:
+    """The tree of these nodes, which are in the order of :func:`walk`; a control node tells how many children
+    it has."""
+    done: list[Node] = []
+    for node in reversed(nodes):
+        if isinstance(node, tuple):
+            key, kind, count, name, template, reason, attempts = node
+            children = tuple(done.pop() for _ in range(count))
+            done.append(ControlNode(key, kind, children, name, template, reason, attempts))
+        else:
+            done.append(node)
+    return done.pop()
 
 
 def tree_depth(root: Node) -> int:

@@ -7,7 +7,7 @@ BehaviorTree.CPP and py_trees agree: with it a tick starts at most one action.
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TypeAlias
 
 from typing_extensions import assert_never
@@ -29,53 +29,49 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 MAX_DEPTH = 256
 """Levels a tree may have: what BehaviorTree.CPP reads."""
 
+_SEVERAL_ATTEMPTS = (
+    "several attempts stand in one last child: sequence(fallback(attempt, attempt), condition)"
+)
+
 ChildPath: TypeAlias = tuple[int, ...]
 """Child numbers from the root of a tree or body down to a node."""
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A broken rule, and the node that breaks it."""
-
-    code: str
-    path: ChildPath
-    message: str
-    hint: str | None = None
 
 
 def check_tree(tree: Tree) -> None:
     """Raise :class:`BbtcError` with every rule the tree breaks: ids are unique, control nodes have
     children (a retry exactly one, and attempts), actions and variables exist in the task, only the
     last child of a Skipper contains actions, no more than :data:`MAX_DEPTH` levels."""
-    problems = [Diagnostic(p.code, p.message, hint=p.hint) for p in tree_problems(tree)]
+    problems = [replace(each, path=()) for each in tree_problems(tree)]
     if problems:
         raise BbtcError(problems)
 
 
-def tree_problems(tree: Tree) -> Iterator[Problem]:
-    """The rules that the tree breaks."""
+def tree_problems(tree: Tree) -> Iterator[Diagnostic]:
+    """The rules that the tree breaks, each with the child numbers down to the node."""
     task = tree.task
     ids: set[str] = set()
 
-    def visit(node: Node, path: ChildPath) -> Iterator[Problem]:
+    def visit(node: Node, path: ChildPath) -> Iterator[Diagnostic]:
         if node.id in ids:
-            yield Problem("BBT0607", path, f"two nodes have the id '{node.id}'")
+            yield Diagnostic("BBT0607", f"two nodes have the id '{node.id}'", path=path)
         ids.add(node.id)
         match node:
             case ConditionNode():
                 if not all(0 <= variable < len(task.variables) for variable in variables(node.condition)):
-                    yield Problem("BBT0606", path, f"condition '{node.id}' reads a variable the task lacks")
+                    yield Diagnostic(
+                        "BBT0606", f"condition '{node.id}' reads a variable the task lacks", path=path
+                    )
             case ActionNode():
                 if node.action not in task.action_by_name:
-                    yield Problem("BBT0606", path, f"no action is called '{node.action}'")
+                    yield Diagnostic("BBT0606", f"no action is called '{node.action}'", path=path)
             case ControlNode(kind="retry"):
                 if node.attempts is None or node.attempts < 1:
-                    yield Problem("BBT0613", path, f"retry '{node.id}' allows no attempts")
+                    yield Diagnostic("BBT0613", f"retry '{node.id}' allows no attempts", path=path)
                 if len(node.children) > 1:
-                    yield Problem("BBT0613", path, f"retry '{node.id}' has more than one child")
+                    yield Diagnostic("BBT0613", f"retry '{node.id}' has more than one child", path=path)
             case ControlNode():
                 if node.attempts is not None:
-                    yield Problem("BBT0613", path, f"{node.kind} '{node.id}' counts attempts")
+                    yield Diagnostic("BBT0613", f"{node.kind} '{node.id}' counts attempts", path=path)
             case _:
                 assert_never(node)
 
@@ -83,8 +79,8 @@ def tree_problems(tree: Tree) -> Iterator[Problem]:
 
 
 def _visit_node(
-    node: Node, path: ChildPath, visit: Callable[[Node, ChildPath], Iterator[Problem]]
-) -> Generator[Problem, None, bool]:
+    node: Node, path: ChildPath, visit: Callable[[Node, ChildPath], Iterator[Diagnostic]]
+) -> Generator[Diagnostic, None, bool]:
     yield from visit(node, path)
     if not isinstance(node, ControlNode):
         return isinstance(node, ActionNode)
@@ -93,19 +89,19 @@ def _visit_node(
     return (yield from _visit_children(node, path, f"{node.kind} '{node.id}'", children))
 
 
-def body_problems(task: Task, template: GroundTemplate, active: Mapping[str, bool]) -> Iterator[Problem]:
-    """The rules that a template's body breaks. ``active`` tells of each template whether its
-    expansion contains an action (:func:`active_templates`)."""
+def body_problems(task: Task, template: GroundTemplate, active: Mapping[str, bool]) -> Iterator[Diagnostic]:
+    """The rules that a template's body breaks, each with the child numbers down to its part.
+    ``active`` tells of each template whether its expansion contains an action (:func:`active_templates`)."""
 
-    def visit(body: Body, path: ChildPath) -> Generator[Problem, None, bool]:
+    def visit(body: Body, path: ChildPath) -> Generator[Diagnostic, None, bool]:
         match body:
             case BodyAction():
                 if body.action not in task.action_by_name:
-                    yield Problem("BBT0606", path, f"no action is called '{body.action}'")
+                    yield Diagnostic("BBT0606", f"no action is called '{body.action}'", path=path)
                 return True
             case BodyTemplate():
                 if body.template not in task.template_by_name:
-                    yield Problem("BBT0606", path, f"no template is called '{body.template}'")
+                    yield Diagnostic("BBT0606", f"no template is called '{body.template}'", path=path)
                 return active.get(body.template, False)
             case BodyCondition():
                 return False
@@ -123,27 +119,27 @@ def _visit_children(
     parent: ControlNode | BodyControl,
     path: ChildPath,
     name: str,
-    children: Iterator[Generator[Problem, None, bool]],
-) -> Generator[Problem, None, bool]:
+    children: Iterator[Generator[Diagnostic, None, bool]],
+) -> Generator[Diagnostic, None, bool]:
     """Yield the problems of a control node and of its children; return whether it contains an
     action. The depth limit bounds the recursion."""
     if not parent.children:
-        yield Problem("BBT0611", path, f"{name} has no children")
+        yield Diagnostic("BBT0611", f"{name} has no children", path=path)
         return False
     if len(path) + 1 >= MAX_DEPTH:
-        yield Problem("BBT0605", path, f"a tree has at most {MAX_DEPTH} levels")
+        yield Diagnostic("BBT0605", f"a tree has at most {MAX_DEPTH} levels", path=path)
         return False
     active = False
     for number, child in enumerate(children):
         child_active = yield from child
         active = active or child_active
         if child_active and parent.kind == "skipper" and number < len(parent.children) - 1:
-            yield Problem(
+            yield Diagnostic(
                 "BBT0610",
-                (*path, number),
                 f"{name} has an action in child {number + 1} of {len(parent.children)}; "
                 "only the last child of a Skipper may contain actions",
-                "several attempts stand in one last child: sequence(fallback(attempt, attempt), condition)",
+                hint=_SEVERAL_ATTEMPTS,
+                path=(*path, number),
             )
     return active
 

@@ -294,8 +294,7 @@ class _Walk(_Writer):
         for end, place in ends.items():
             self.ends[end] = all_of(self.start.begun, Compare(self._at, "=", place))
         for leaf in leaves:
-            if leaf.id in self._next:
-                self._leaf(leaf, first)
+            self._leaf(leaf, first)
 
     def _entry(self, node: Node, success: int, failure: int, running: int) -> int:
         """Where a tick of the node begins, given where it goes on after each status."""

@@ -32,7 +32,7 @@ State: TypeAlias = tuple[int, ...]
 class Step(NamedTuple):
     """A possible successor of a state: its number, the probability, and the rewards on the way."""
 
-    target: int
+    successor: int
     probability: Fraction
     rewards: tuple[Fraction, ...]
 
@@ -73,11 +73,11 @@ def explore(program: Program, limits: Limits) -> Space:
             for branch, after_of, rewards_of in compiled:
                 after = after_of(state)
                 assert all(map(int.__le__, after, highest)), "a value is out of its range"
-                target = number.setdefault(after, len(states))
-                if target == len(states):
+                successor = number.setdefault(after, len(states))
+                if successor == len(states):
                     states.append(after)
-                steps.append(Step(target, branch.probability, rewards_of(state)))
-            stays = all(step.target == index for step in steps) and command.action is None
+                steps.append(Step(successor, branch.probability, rewards_of(state)))
+            stays = all(step.successor == index for step in steps) and command.action is None
             enabled.append((command, () if stays else tuple(steps)))
         assert program.kind == "mdp" or len(enabled) == 1, f"{len(enabled)} commands are enabled"
         choices.append(tuple(enabled))

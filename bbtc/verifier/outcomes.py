@@ -52,7 +52,7 @@ def relevant(task: Task, actions: Iterable[GroundAction], read: Iterable[int]) -
         more = {
             variable
             for effect in effects
-            if effect.when is not None and any(target in needed for target, _ in effect.sets)
+            if effect.when is not None and any(changed in needed for changed, _ in effect.sets)
             for variable in variables(effect.when)
         }
         if more <= needed:

@@ -4,6 +4,9 @@ The states are put into strongly connected components, those that are reached la
 and Sharir). In each, x = P x + c is solved for several right-hand sides at once by Gaussian
 elimination over rationals, the sparsest row first (Markowitz 1957). A state from which no end can be
 reached has value 0.
+
+This solver stands apart from ``bbtc.markov`` on purpose, with other algorithms: a fault there must not show
+here, too.
 """
 
 from __future__ import annotations
@@ -85,7 +88,7 @@ class Solver:
         for state, row in enumerate(rows):
             for step in row:
                 if step.probability:
-                    backward[step.target].append(state)
+                    backward[step.successor].append(state)
         self._ending = _closure(backward, last)
         self._last = last
         self._components = _components(rows, backward)
@@ -116,15 +119,15 @@ class Solver:
         for state in inside:
             row: dict[int, Fraction] = {}
             constant = [_ZERO] * len(columns)
-            for target, p, rewards in self._rows[state]:
-                if target in member:
-                    row[target] = row.get(target, _ZERO) + p
-                elif target in self._ending:
+            for successor, p, rewards in self._rows[state]:
+                if successor in member:
+                    row[successor] = row.get(successor, _ZERO) + p
+                elif successor in self._ending:
                     for number, column in enumerate(columns):
-                        if column[target]:
-                            constant[number] += p * column[target]
+                        if column[successor]:
+                            constant[number] += p * column[successor]
                 if earned is not None and rewards[earned[0]]:
-                    constant[0] += p * rewards[earned[0]] * earned[1][target]
+                    constant[0] += p * rewards[earned[0]] * earned[1][successor]
             system[state], right[state] = row, constant
         for state, solved in eliminate(system, right, self._limits).items():
             for column, value in zip(columns, solved, strict=True):
@@ -138,8 +141,8 @@ def eliminate(
     arguments are used up."""
     users: dict[int, set[int]] = {state: set() for state in system}
     for state, row in system.items():
-        for target in row:
-            users[target].add(state)
+        for successor in row:
+            users[successor].add(state)
     order: list[int] = []
     left = set(system)
     while left:
@@ -153,23 +156,23 @@ def eliminate(
         # 2. x = a x + … becomes x = …/(1 - a).
         scale = 1 - row.pop(pivot, _ZERO)
         if scale != 1:
-            for target in row:
-                row[target] /= scale
+            for successor in row:
+                row[successor] /= scale
             constant[:] = [value / scale for value in constant]
         # 3. It is put into the rows that use it.
         for user in sorted(users[pivot] & left):
             other = system[user]
             factor = other.pop(pivot)
-            for target, p in row.items():
-                other[target] = other.get(target, _ZERO) + factor * p
-                users[target].add(user)
+            for successor, p in row.items():
+                other[successor] = other.get(successor, _ZERO) + factor * p
+                users[successor].add(user)
             right[user] = [a + factor * b for a, b in zip(right[user], constant, strict=True)]
     # 4. The last one eliminated uses none; the others only those eliminated after them.
     solution: dict[int, list[Fraction]] = {}
     for state in reversed(order):
         value = right[state]
-        for target, p in system[state].items():
-            value = [a + p * b for a, b in zip(value, solution[target], strict=True)]
+        for successor, p in system[state].items():
+            value = [a + p * b for a, b in zip(value, solution[successor], strict=True)]
         solution[state] = value
     return solution
 
@@ -198,9 +201,9 @@ def _components(rows: Sequence[Row], backward: Sequence[Sequence[int]]) -> list[
         while stack:
             state, steps = stack[-1]
             for step in steps:
-                if step.probability and not seen[step.target]:
-                    seen[step.target] = True
-                    stack.append((step.target, iter(rows[step.target])))
+                if step.probability and not seen[step.successor]:
+                    seen[step.successor] = True
+                    stack.append((step.successor, iter(rows[step.successor])))
                     break
             else:
                 left.append(state)

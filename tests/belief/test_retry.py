@@ -8,7 +8,7 @@ import pytest
 
 from bbtc.belief.chain import explore
 from bbtc.belief.simulate import simulate
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import TRUE, Is
 from bbtc.ground.task import Task
@@ -48,7 +48,9 @@ def test_a_retry_tries_so_often_and_no_more() -> None:
 
 def test_the_figures_name_the_retry_whose_attempts_are_used_up() -> None:
     figures = simulate(coin(), until_heads(retry("again", 1, throw())), Limits())
-    assert [(s.node, s.condition, s.status) for s in figures.failures] == [("again", None, Status.FAILURE)]
+    assert [(s.node, s.condition, s.status) for s in figures.failures] == [
+        ("again", None, NodeStatus.FAILURE)
+    ]
 
 
 def test_a_guarded_action_that_was_refused_lacks_no_precondition() -> None:
@@ -101,7 +103,7 @@ def test_chains_of_random_trees_follow_the_reference(seed: int) -> None:
         if run.started is not None and run.started.latched:
             run.finished.add(run.started.id)
         after = (frozenset(run.finished), tuple(sorted(run.tries.items())))
-        todo.extend((edge.target, after) for edge in chain.edges[index])
+        todo.extend((edge.successor, after) for edge in chain.edges[index])
     assert len(seen) == len(chain.states)
 
 

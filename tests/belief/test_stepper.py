@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
 from bbtc.belief.stepper import Branch, Stepper
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.limits import Limits
 from bbtc.tree.nodes import Tree
@@ -71,5 +71,5 @@ def test_seeds_draw_by_the_probabilities() -> None:
         stepper = Stepper(tree.task, tree.root, seed)
         stepper.start()
         finish(stepper)
-        wins += stepper.now.status is Status.SUCCESS
+        wins += stepper.now.status is NodeStatus.SUCCESS
     assert 150 < wins < 250  # of 400 with probability 1/2: five standard deviations on either side

@@ -40,7 +40,7 @@ def ours(domain: Path, problem: Path) -> dict[str, Any]:
     from bbtc.limits import Limits
     from bbtc.pipeline import compile_sources
     from bbtc.planner.mdp.explore import explore_space
-    from bbtc.planner.mdp.maxprob import reachability
+    from bbtc.planner.mdp.maxprob import max_prob
     from bbtc.syntax.reader import read_source
 
     task = compile_sources([read_source(str(domain)), read_source(str(problem))], Report(), Limits())
@@ -49,7 +49,7 @@ def ours(domain: Path, problem: Path) -> dict[str, Any]:
     space = explore_space(task, limits)
     first = since(start)
     start = clocks()
-    value = reachability(space, limits).initial
+    value = max_prob(space, limits).initial
     second = since(start)
     return {"first": first, "second": second, "states": len(space.states), "value": float(value.lower)}
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-TEMPLATE = Path(__file__).parents[2] / "bbtc" / "build" / "template"
+TEMPLATE = Path(__file__).parents[2] / "bbtc" / "builder" / "template"
 REPOSITORY = Path(__file__).parents[2]
 
 COIN = """(define (domain coin)

@@ -21,7 +21,7 @@ from bbtc import pipeline
 from bbtc.builder import pool, runner, state
 from bbtc.builder.job import Job
 from bbtc.builder.runner import BuildReport, build
-from bbtc.manifest.read import TreeEntry
+from bbtc.manifest.entries import TreeEntry
 from tests.build.projects import COIN, REPOSITORY, bbtc, project, several, snapshot
 
 LAMP = "(define (domain lamp) (:predicates (lit)) (:action on :effect (lit)))\n"

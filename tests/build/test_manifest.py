@@ -14,9 +14,10 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from bbtc.diagnostics import BbtcError
+from bbtc.manifest.entries import Manifest
 from bbtc.manifest.expectations import FIGURES
 from bbtc.manifest.find import find_manifest
-from bbtc.manifest.read import Manifest, read_manifest
+from bbtc.manifest.read import read_manifest
 from bbtc.planner.strategies import DEFAULT, STRATEGIES
 
 REPOSITORY = Path(__file__).parents[2]

@@ -46,6 +46,7 @@ def examples(code: str) -> dict[str, str]:
     return dict(EXAMPLE.findall((PAGES / f"{code}.md").read_text("utf-8")))
 
 
+TITLES = {code: each.title for code, each in CODES.items()}
 WITH_EXAMPLES = [code for code in CODES if (PAGES / f"{code}.md").exists() and examples(code)]
 
 
@@ -70,7 +71,7 @@ def diagnostics(text: str) -> list[Diagnostic]:
 @pytest.mark.parametrize("code", CODES)
 def test_every_code_has_a_page_with_its_title(code: str) -> None:
     text = (PAGES / f"{code}.md").read_text("utf-8")
-    assert text.startswith(f"# {code}: {CODES[code]}\n\n")
+    assert text.startswith(f"# {code}: {CODES[code].title}\n\n")
     shown = f"[{code}]" in text and "```console" in text
     assert shown or set(examples(code)) == {"Wrong", "Right"} or code in WORDS_ALONE
 
@@ -81,7 +82,9 @@ def test_no_page_is_left_over() -> None:
 
 def test_the_index_lists_every_code() -> None:
     index = (PAGES / "README.md").read_text("utf-8")
-    assert dict(re.findall(r"^\| \[(BBT\d{4})\]\(\1\.md\) \| (.*) \|$", index, re.MULTILINE)) == CODES
+    assert dict(re.findall(r"^\| \[(BBT\d{4})\]\(\1\.md\) \| (.*) \|$", index, re.MULTILINE)) == {
+        code: each.title for code, each in CODES.items()
+    }
 
 
 @pytest.mark.parametrize("code", WITH_EXAMPLES)
@@ -108,7 +111,9 @@ def test_explain_prints_the_page(spelling: str) -> None:
 
 
 def test_explain_without_a_code_lists_all() -> None:
-    assert [line.split("  ", 1) for line in explain().stdout.splitlines()] == [list(c) for c in CODES.items()]
+    assert [line.split("  ", 1) for line in explain().stdout.splitlines()] == [
+        [each.code, each.title] for each in CODES.values()
+    ]
 
 
 def test_an_unknown_code_is_wrong_usage_and_gets_near_ones() -> None:

@@ -11,9 +11,9 @@ import re
 
 import pytest
 
+from bbtc.artefacts.numbers import exact
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
-from bbtc.cli.wording import exact
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.limits import Limits

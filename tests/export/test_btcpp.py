@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import re
 from dataclasses import replace
@@ -11,6 +12,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from hypothesis import given
 
+import bbtc
 from bbtc.backends.btcpp.names import RESERVED
 from bbtc.backends.registry import load_exporter, parse_options
 from bbtc.backends.shape import DEEPEST_CONDITION, DEEPEST_TREE
@@ -20,6 +22,7 @@ from bbtc.ground.task import GroundAction, InitialState, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.replay.engines import BtcppReplay, PyTreesReplay
 from bbtc.replay.script import TIMINGS, Run, Script
+from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from tests import btcpp_nodes
 from tests.conftest import Golden
@@ -395,3 +398,16 @@ def test_a_subtree_cut_out_for_its_depth_behaves_as_in_place() -> None:
         for script, expected in varied_runs(tree.task, tree.root, seed, keep=4):
             for timing in TIMINGS:
                 assert replay.run(script, timing) == expected
+
+
+def test_the_notes_say_which_object_a_port_value_stands_for_that_is_spelt_otherwise() -> None:
+    text = """(define (domain d) (:predicates (seen ?r))
+      (:action look :parameters (?r) :effect (probabilistic 1/2 (seen ?r))))
+    (define (problem p) (:domain d) (:objects $left right) (:init) (:goal (and (seen $left) (seen right))))"""
+    xml = bbtc.export(bbtc.plan(SourceFile("d.pddl", text), target=0), "btcpp")
+    told = re.findall(r'"objects": (\{.*?\})', xml)
+    plain = bbtc.export(bbtc.plan(SourceFile("d.pddl", text.replace("$", "")), target=0), "btcpp")
+    assert (len(told), '"objects"' in plain) == (1, False)
+    ((value, name),) = json.loads(told[0]).items()
+    assert name == "$left"
+    assert re.fullmatch(r"[A-Za-z_]\w*", value)

@@ -147,6 +147,22 @@ def test_the_flow_stands_at_the_lines(form: str, options: dict[str, str]) -> Non
     assert "7/8" not in str(export(templated(), form, options))
 
 
+def test_the_flow_stands_beside_its_line() -> None:
+    """Two thirds of the way down, a little to the right."""
+    flow = {node.id: Fraction(7, 8) for node in walk(soda_tree().root)}
+    picture = ET.fromstring(str(export(soda_tree(), "svg", {"layout": "bbtc"}, flow)))
+    groups = [group for group in picture.iter(f"{_SVG}g") if group.get("class") == "line"]
+    assert groups
+    for group in groups:
+        line, text = group.find(f"{_SVG}line"), group.find(f"{_SVG}text")
+        assert line is not None
+        assert text is not None
+        x1, x2, x = (float(str(each.get(name))) for each, name in ((line, "x1"), (line, "x2"), (text, "x")))
+        y1, y2, y = (float(str(each.get(name))) for each, name in ((line, "y1"), (line, "y2"), (text, "y")))
+        assert x == pytest.approx((x1 + 2 * x2) / 3 + 4, abs=0.2)
+        assert y1 + (y2 - y1) / 2 < y <= y2 + 2
+
+
 def test_flow_is_exact_where_that_is_short() -> None:
     assert flow_text(Fraction(31, 32)) == "31/32"
     assert flow_text(Fraction(1)) == "1"

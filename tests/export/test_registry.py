@@ -156,6 +156,8 @@ def test_options_are_typed_and_have_defaults() -> None:
     assert parse_options(plain, {}) == {"depth": 3, "color": False, "style": "wide", "title": ""}
     given = {"depth": "-12", "color": "yes", "style": "narrow", "title": "a=b"}
     assert parse_options(plain, given) == {"depth": -12, "color": True, "style": "narrow", "title": "a=b"}
+    for value, words in {True: ("true", "yes", "on", "Yes"), False: ("false", "no", "off", "OFF")}.items():
+        assert [parse_options(plain, {"color": word})["color"] for word in words] == [value] * len(words)
 
 
 @pytest.mark.parametrize(

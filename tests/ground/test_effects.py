@@ -9,7 +9,8 @@ import pytest
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground.describe import describe
 from bbtc.ground.instantiate import ground, instantiate
-from bbtc.ground.task import Factor, GroundAction, Task, charges_of
+from bbtc.ground.task import Factor, GroundAction, Task, charges_of, effects_of
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from tests.ground.examples import model_of, task_of
 
@@ -42,6 +43,69 @@ def _words(task: Task, factor: Factor) -> str:
         nested = [f"<{_words(task, each)}>" for each in outcome.factors]
         outcomes.append(f"{outcome.probability}: {'; '.join([*effects, *nested])}".rstrip())
     return " | ".join(outcomes)
+
+
+RULES = {
+    1: [("(forall (?x - t) (s ?x))", ["1: s(a)=true s(b)=true s(c)=true"])],
+    2: [
+        ("(and (r) (when (fixed a) (not (q))) (when (fixed b) (not (p))))", ["1: q()=false r()=true"]),
+        ("(when (or (fixed a) (p)) (not (q)))", ["1: q()=false"]),
+        ("(when (and (fixed a) (p)) (and (not (p)) (not (q))))", ["1: [p()] p()=false q()=false"]),
+    ],
+    3: [
+        (
+            "(when (q) (probabilistic 0.5 (not (p)) 0.5 (not (q))))",
+            ["1/2: [q()] p()=false | 1/2: [q()] q()=false"],
+        ),
+    ],
+    4: [
+        ("(and (not (p)) (unknown (p)) (q) (not (q)))", ["1: p()=unknown q()=true"]),
+        (
+            "(when (p) (and (not (p)) (unknown (p)) (r) (not (r))))",
+            ["1: [p()] p()=unknown r()=true"],
+        ),
+    ],
+    5: [
+        (
+            "(probabilistic 0.5 (probabilistic 0.2 (not (p)) 0.8 (not (q))) 0.5 (r))",
+            ["1/10: p()=false | 2/5: q()=false | 1/2: r()=true"],
+        ),
+        (
+            "(probabilistic 0.5 (oneof (not (p)) (not (q))) 0.5 (r))",
+            ["1/2: <1/2: p()=false | 1/2: q()=false> | 1/2: r()=true"],
+        ),
+    ],
+    6: [
+        ("(probabilistic 0.3 (r) 0.5 (not (p)) 0.2 (r))", ["1/2: r()=true | 1/2: p()=false"]),
+        (
+            "(probabilistic 0.3 (when (p) (r)) 0.5 (not (p)) 0.2 (when (p) (r)))",
+            ["1/2: [p()] r()=true | 1/2: p()=false"],
+        ),
+    ],
+    7: [
+        ("(and (not (p)) (probabilistic 0.4 (r) 0.6 (r)))", ["1: p()=false r()=true"]),
+        (
+            "(and (probabilistic 0.4 (r) 0.6 (r)) (probabilistic 0.5 (not (p))))",
+            ["1/2: p()=false r()=true | 1/2: r()=true"],
+        ),
+    ],
+    8: [
+        (
+            "(and (r) (probabilistic 0.2 (not (p)) 0.8 (not (q))))",
+            ["1/5: p()=false r()=true | 4/5: q()=false r()=true"],
+        ),
+        (
+            "(and (probabilistic 0.2 (not (p))) (probabilistic 0.5 (not (q))) (r))",
+            ["1: r()=true", "1/5: p()=false | 4/5:", "1/2: q()=false | 1/2:"],
+        ),
+    ],
+}
+"""For each rule of ``bbtc.ground.effects`` effects, and the factors that they come to."""
+
+
+@pytest.mark.parametrize(("effect", "factors"), [pair for pairs in RULES.values() for pair in pairs])
+def test_an_effect_is_rewritten(effect: str, factors: list[str]) -> None:
+    assert _act(effect) == factors
 
 
 def test_what_is_certain_joins_the_only_chance() -> None:
@@ -407,3 +471,44 @@ def test_numbers_whose_exact_value_grows_without_bound_are_refused(effect: str, 
         _task(effect, metric="(:metric minimize (total-cost))" if metric else "")
     assert {diagnostic.code for diagnostic in caught.value.diagnostics} == {"BBT0113"}
     assert all(diagnostic.span is not None for diagnostic in caught.value.diagnostics)
+
+
+def test_what_an_action_sets_in_vain_is_left_out_for_these_arguments_only() -> None:
+    """Only the hall is ever dirty: to clean the attic sets one fact, to clean the hall sets two."""
+    task = task_of("""(define (domain d) (:predicates (seen ?r) (dirty ?r))
+      (:action clean :parameters (?r) :effect (and (not (dirty ?r)) (seen ?r))))
+    (define (problem p) (:domain d) (:objects attic hall) (:init (dirty hall))
+      (:goal (and (seen attic) (seen hall) (not (dirty hall)))))""")
+    names = [variable.name for variable in task.variables]
+    sets = {
+        action.name: {(names[v], value) for effect in effects_of(action.factors) for v, value in effect.sets}
+        for action in task.actions
+    }
+    assert sets == {
+        "clean(attic)": {("seen(attic)", Truth.TRUE)},
+        "clean(hall)": {("dirty(hall)", Truth.FALSE), ("seen(hall)", Truth.TRUE)},
+    }
+
+
+@pytest.mark.parametrize(
+    ("metric", "kept"), [("(:metric maximize (reward))", ["shut()", "wave()"]), ("", ["shut()"])]
+)
+def test_what_earns_a_reward_matters_where_rewards_count(metric: str, kept: list[str]) -> None:
+    """Nobody asks whether somebody waved, or sang for a fee."""
+    task = task_of(f"""(define (domain d) (:requirements :rewards :action-costs)
+      (:predicates (closed) (waved) (sung)) (:functions (total-cost))
+      (:action shut :effect (closed))
+      (:action wave :effect (and (waved) (increase (reward) 2)))
+      (:action sing :effect (and (sung) (increase (total-cost) 2))))
+    (define (problem p) (:domain d) (:init) (:goal (closed)) {metric})""")
+    assert [action.name for action in task.actions] == kept
+
+
+def test_charges_under_one_condition_that_come_to_nothing_are_none() -> None:
+    task = task_of("""(define (domain d) (:requirements :rewards) (:predicates (lit) (done))
+      (:action act :effect (and (done)
+        (when (lit) (increase (reward) 2)) (when (lit) (decrease (reward) 2))))
+      (:action press :effect (lit)))
+    (define (problem p) (:domain d) (:init) (:goal (and (done) (lit))) (:metric maximize (reward)))""")
+    act = task.action_by_name["act()"]
+    assert list(charges_of(act.factors)) == []

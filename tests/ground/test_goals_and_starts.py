@@ -16,7 +16,7 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.explore import explore_space
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.ssp import least_cost
 from tests.ground.examples import model_of, task_of
 
@@ -203,7 +203,7 @@ def test_what_no_action_changes_has_the_value_it_starts_with(
     init: str, condition: str, best: str, cost: str
 ) -> None:
     task = task_of(_TWO_CHANCES.format(init=init, condition=condition))
-    found = reachability(explore_space(task, Limits()), Limits())
+    found = max_prob(explore_space(task, Limits()), Limits())
     cheapest = least_cost(found, Limits())
     assert found.initial.exact == Fraction(best)
     assert cheapest is not None
@@ -383,3 +383,13 @@ def test_large_tasks_are_grounded_like_small_ones() -> None:
           (:init {roads} {facts}) (:goal (at t0 c7)))"""
     task = task_of(text)
     assert (len(task.actions), len(task.variables)) == (40, 40)
+
+
+def test_a_variable_has_the_place_where_it_is_given_or_else_where_it_is_declared() -> None:
+    task = task_of("""(define (domain d) (:predicates (dirty ?r) (seen ?r))
+      (:action clean :parameters (?r) :effect (and (not (dirty ?r)) (seen ?r))))
+    (define (problem p) (:domain d) (:objects hall) (:init (dirty hall))
+      (:goal (and (seen hall) (not (dirty hall)))))""")
+    places = {variable.name: variable.span for variable in task.variables}
+    words = {name: span.text for name, span in places.items() if span is not None}
+    assert words == {"dirty(hall)": "(dirty hall)", "seen(hall)": "seen"}

@@ -70,6 +70,7 @@ PACKAGES = {
         "tests/replay/test_replay.py",
         "tests/replay/test_actions.py",
         "tests/domains/test_same_behaviour.py",
+        "tests/build/test_begun.py",
     ),
 }
 

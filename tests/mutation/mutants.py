@@ -60,8 +60,8 @@ class Mutant:
 
 def mutants_of(root: Path, file: str) -> list[Mutant]:
     """The mutants of a module, in order of their places. Left out is what no test could tell: annotations,
-    texts, assertions (they are never false), private numbers of a module (bounds of effort), and how often
-    the limits are looked at."""
+    texts, assertions (they are never false), private numbers of a module (bounds of effort, measures), and
+    how often the limits are looked at."""
     source = (root / file).read_text("utf-8")
     finder = _Finder(file, source)
     finder.visit(ast.parse(source))
@@ -172,6 +172,8 @@ class _Finder(ast.NodeVisitor):
             ast.Mult,
             ast.LShift,
             ast.Div,
+            ast.Tuple,
+            ast.Load,
         }
         return not self._names and private and plain
 

@@ -88,10 +88,9 @@ def selection(project: Project, reach: Reach, mutant: Mutant, most: float = inf)
     that run the function; for what runs while modules are imported, those that run anything of the module."""
     source = (project.root / mutant.file).read_text("utf-8")
     lines = lines_of(source, mutant.start, mutant.end)
-    tests = reach.running(mutant.file, lines) or reach.running(
-        mutant.file, function_around(source, mutant.line)
-    )
-    if IMPORTED in tests:
+    function = function_around(source, mutant.line)
+    tests = reach.running(mutant.file, lines) or reach.running(mutant.file, function)
+    if IMPORTED in tests or not function:
         tests = reach.running(mutant.file, range(source.count("\n") + 2))
     return reach.quick_first(tests - {IMPORTED}, most)
 

@@ -15,7 +15,7 @@ from hypothesis import given
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.scenarios import scenarios
 from bbtc.belief.simulate import figures
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import Condition, Is, conjunction
 from bbtc.kleene import Truth
@@ -196,10 +196,10 @@ def _all_runs(chain: Chain, most: int) -> Iterator[tuple[Fraction, int]]:
             raise OverflowError
         if not chain.edges[state]:
             yield probability, state
-        targets: dict[int, Fraction] = {}
+        successors: dict[int, Fraction] = {}
         for edge in chain.edges[state]:
-            targets[edge.target] = targets.get(edge.target, Fraction(0)) + edge.result.probability
-        todo.extend((probability * p, target) for target, p in targets.items())
+            successors[edge.successor] = successors.get(edge.successor, Fraction(0)) + edge.result.probability
+        todo.extend((probability * p, after) for after, p in successors.items())
 
 
 @examples(80)
@@ -208,7 +208,7 @@ def test_the_failing_runs_are_those_of_the_plain_enumeration(tree: Tree) -> None
     chain = explore(tree.task, tree.root, Limits())
     try:
         runs = [
-            (p, end) for p, end in _all_runs(chain, 5000) if chain.status[end] is not Status.SUCCESS and p
+            (p, end) for p, end in _all_runs(chain, 5000) if chain.status[end] is not NodeStatus.SUCCESS and p
         ]
     except OverflowError:
         return

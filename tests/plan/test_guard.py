@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.simulate import simulate
-from bbtc.belief.tick import STARTED, Status, compile_tick
+from bbtc.belief.tick import STARTED, NodeStatus, compile_tick
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import TRUE, And, Is, Or, conjuncts, evaluate
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
@@ -117,4 +117,4 @@ def test_below_a_retry_node_a_test_takes_the_place_of_a_guard_that_would_block_t
             expected = "first()" if evaluate(needed, values) is Truth.TRUE else "second()"
             assert starts[status - STARTED] == expected
         else:
-            assert status == (Status.SUCCESS if values[done] == Truth.TRUE else Status.RUNNING)
+            assert status == (NodeStatus.SUCCESS if values[done] == Truth.TRUE else NodeStatus.RUNNING)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import numpy as np
 import pytest
 from hypothesis import given
 
@@ -13,8 +14,8 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
-from bbtc.planner.mdp.h_add import Heuristic
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.h_add import Facts, Relaxation, operators_of
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.solve import best_known
 from tests.long_form import amount
 from tests.plan.examples import Optimum, cases, public
@@ -34,7 +35,7 @@ SMALL = 2
 @MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> None:
-    known = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
     found = search_bounds(of, Limits(), step=SMALL)
     assert found.stop is None
@@ -46,7 +47,7 @@ def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> N
 @MANY
 @given(of=tasks(nested=2, most_actions=6))
 def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
-    known = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
     for states in (1, 3, 6):
         found = search_bounds(of, Limits(states=states), step=SMALL)
@@ -61,10 +62,37 @@ def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
 @given(of=tasks(nested=2, most_actions=6))
 def test_what_the_heuristic_calls_a_dead_end_is_one(of: Task) -> None:
     space = explore_space(of, Limits())
-    guess = Heuristic(of, space.packing).estimate(space.states)
-    hopeless = reachability(space, Limits()).zero
+    guess = Relaxation(of, Limits(), count_actions=True).estimate(space.packing, space.states)
+    hopeless = max_prob(space, Limits()).prob_0
     assert not (guess == float("inf"))[~hopeless].any()
     assert ((guess == 0) | ~space.goal).all()
+
+
+@MANY
+@given(of=tasks(nested=2, most_actions=6))
+def test_the_guess_for_many_states_at_a_time_is_that_for_each(of: Task) -> None:
+    """By the equations of the additive heuristic, one state and one operator at a time."""
+    space = explore_space(of, Limits())
+    found = Relaxation(of, Limits(), count_actions=True)
+    operators = [each for n, a in enumerate(of.actions) for each in operators_of(n, a.factors)]
+    for row, guess in enumerate(found.estimate(space.packing, space.states).tolist()):
+        values = space.packing.values(space.states, row)
+        costs = [float("inf")] * (3 * len(values))
+        for variable, value in enumerate(values):
+            costs[3 * variable + value] = 0.0
+        while True:
+            before, facts = list(costs), Facts(np.array(costs))
+            for operator in operators:
+                needed = facts.cost(of.actions[operator.action].precondition)
+                needed += 0.0 if operator.when is None else facts.cost(operator.when)
+                for variable, value in operator.sets:
+                    fact = 3 * variable + value
+                    costs[fact] = min(costs[fact], needed + min(100, float(1 / operator.probability)))
+            if costs == before:
+                break
+        assert guess == pytest.approx(Facts(np.array(costs)).cost(of.goal), rel=1e-5)
+        weighed = Relaxation(of, Limits()).facts(values)
+        assert np.isinf(weighed.costs[: len(costs)]).tolist() == np.isinf(costs).tolist()
 
 
 def test_a_loop_that_can_be_left_only_with_a_loss_is_not_worth_more_than_its_exit() -> None:

@@ -23,10 +23,11 @@ from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan
+from bbtc.planner.synthesis.permissive import likely_policy
 from bbtc.planner.synthesis.rules import Literal, Rule
 from bbtc.planner.synthesis.rules import Test as ValueTest
 from bbtc.planner.synthesis.tree import _Builder
@@ -85,7 +86,7 @@ def test_random_tasks_are_solved_at_their_best_and_least_cost(of: Task) -> None:
     check_tree(tree)
     chain = explore(of, tree.root, Limits())
     assert violations(of, chain) == []
-    found = reachability(explore_space(of, Limits()), Limits())
+    found = max_prob(explore_space(of, Limits()), Limits())
     assert tree.success_probability == simulate(of, tree.root, Limits()).success == found.initial.exact
     assert tree.status == ("target-reached" if tree.success_probability == 1 else "out-of-reach")
     assert tree.bounds == (tree.success_probability, tree.success_probability)
@@ -162,7 +163,7 @@ def test_where_no_number_of_tries_is_enough_there_is_no_bound() -> None:
 @given(of=tasks(), target=st.sampled_from(["1/3", "0.9", "0.999"]))
 def test_one_attempt_less_would_miss_the_target(of: Task, target: str) -> None:
     done = plan(of, target, options=DEFAULTS)
-    best = reachability(explore_space(of, Limits()), Limits()).initial.exact
+    best = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert best is not None
     assert done.tree.success_probability <= best
     assert (done.tree.status == "target-reached") == (best >= Fraction(target))
@@ -250,3 +251,24 @@ def test_many_rules_that_share_little_take_a_bounded_time_to_write_down() -> Non
     assert [each.action for node in nodes for each in walk(node) if isinstance(each, ActionNode)] == [
         each.name for each in of.actions
     ]
+
+
+def test_of_a_large_policy_the_states_most_often_visited_come_first() -> None:
+    """A walk of ten steps, each of which slips off its way with 1/10: the first states are the likeliest."""
+    steps = [
+        action(
+            f"step{i}",
+            conjunction([Is(i, T), Is(i + 1, F), Is(11, F)]),
+            ("9/10", {i + 1: T}),
+            ("1/10", {11: T}),
+        )
+        for i in range(10)
+    ]
+    of = task("a b c d e f g h i j k off", {0: T}, Is(10, T), *steps)
+    found = max_prob(explore_space(of, Limits()), Limits())
+    assert likely_policy(found, 100) is None, "all fit"
+    draft = likely_policy(found, 4)
+    assert draft is not None
+    assert sorted(of.actions[number].name for number in draft.choice_action) == [
+        "step0()", "step1()", "step2()", "step3()"
+    ]  # fmt: skip

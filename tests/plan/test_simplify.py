@@ -17,9 +17,8 @@ from bbtc.ground.condition import TRUE, Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.rewrite.prune import without_idle_branches
 from bbtc.rewrite.shrink import shrunk
-from bbtc.rewrite.simplify import numbered, simplified, size
+from bbtc.rewrite.simplify import numbered, simplified, size, without_idle_branches
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from bbtc.tree.validate import check_tree
 from tests.domains.brute_force import runs_of

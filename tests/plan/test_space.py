@@ -18,7 +18,8 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp import packing as space_packing
 from bbtc.planner.mdp import transitions as space_actions
-from bbtc.planner.mdp.explore import StateSpace, explore_space
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.planner.mdp.state_table import StateTable
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -58,10 +59,11 @@ def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
     for state, before in enumerate(values):
         assert before not in found, "a state stands twice"
         found[before] = {}
-        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
-            for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
-                draw = space.draws[space.edge_draw[edge]]
-                key = (space.action_name(choice), values[space.edge_target[edge]], draw.cost, draw.reward)
+        for choice in space.choices_of(np.array([state])).tolist():
+            name = space.task.actions[int(space.choice_action[choice])].name
+            for successor, number in space.outcomes(choice):
+                draw = space.draws[number]
+                key = (name, values[successor], draw.cost, draw.reward)
                 found[before][key] = found[before].get(key, Fraction(0)) + draw.probability
     return found
 
@@ -87,8 +89,8 @@ def test_actions_with_very_many_outcomes_and_disjuncts_take_another_way_to_the_s
     assert by_arrays(space) == by_simulator(task)
 
 
-def lamps(count: int) -> Task:
-    """Any lamp can be switched on; over 64 of them take more than one word."""
+def lamps(count: int, off: int = 3) -> Task:
+    """Any lamp can be switched on, but for the last ones all are; over 64 of them take more than one word."""
     switches = tuple(
         GroundAction(
             "switch", (f"{i:03}",), Is(i, Truth.FALSE), (Factor((Outcome(Fraction(1), (_on(i),)),)),)
@@ -96,13 +98,17 @@ def lamps(count: int) -> Task:
         for i in range(count)
     )
     variables = tuple(Variable("lit", (f"{i:03}",), three_valued=i % 2 == 0) for i in range(count))
-    start = tuple(Truth.TRUE if i < count - 3 else Truth.FALSE for i in range(count))
+    start = tuple(Truth.TRUE if i < count - off else Truth.FALSE for i in range(count))
     last = Is(count - 1, Truth.TRUE)
     return Task("lamps", "all", variables, (InitialState(Fraction(1), start),), last, switches)
 
 
 def _on(variable: int) -> Effect:
     return Effect(None, ((variable, Truth.TRUE),))
+
+
+def _off(variable: int) -> Factor:
+    return Factor((Outcome(Fraction(1), (Effect(None, ((variable, Truth.FALSE),)),)),))
 
 
 def test_states_of_several_words() -> None:
@@ -113,11 +119,33 @@ def test_states_of_several_words() -> None:
     assert by_arrays(space) == by_simulator(space.task)
 
 
+def test_many_states_at_once_and_many_actions() -> None:
+    """Levels of 126 states to expand, each with 600 actions of which few apply: some need what is false, some
+    what is true."""
+    task = lamps(600, off=5)
+    flipped = [
+        dataclasses.replace(each, precondition=Is(i, Truth.TRUE), factors=(_off(i),))
+        if 150 <= i < 155
+        else each
+        for i, each in enumerate(task.actions)
+    ]
+    space = explore_space(dataclasses.replace(task, actions=tuple(flipped)), Limits())
+    assert len(space.states) == 2**10
+    assert by_arrays(space) == by_simulator(space.task)
+
+
+def test_an_action_that_draws_nothing_changes_nothing() -> None:
+    wait = GroundAction("wait", (), TRUE, ())
+    of = lamps(4)
+    space = explore_space(dataclasses.replace(of, actions=(*of.actions, wait)), Limits())
+    assert by_arrays(space) == by_simulator(of) == by_simulator(space.task)
+
+
 def test_a_depth_leaves_the_rest_unexpanded() -> None:
     task = dataclasses.replace(lamps(70), goal=Is(0, Truth.FALSE))
-    assert explore_space(task, Limits(), depth=1).levels == (0, 1)
-    space = explore_space(task, Limits(), depth=2)
-    assert (space.levels, space.expanded, len(space.states)) == ((0, 1, 4), 4, 7)
+    for depth, (expanded, found) in enumerate([(0, 1), (1, 4), (4, 7)]):
+        space = explore_space(task, Limits(), depth=depth)
+        assert (space.expanded, len(space.states)) == (expanded, found)
     assert not space.complete
     assert space.stop is None
 
@@ -151,6 +179,11 @@ def test_the_table_grows() -> None:
     assert (table.number(first) == np.arange(5000)).all()
     assert (table.number(first[::-1]) == np.arange(5000)[::-1]).all()
     assert table.count == 5000
+    for multiplier in range(3, 103, 2):  # where they stand in the table differs
+        table, states = StateTable(1), np.arange(300, dtype=np.uint64).reshape(-1, 1) * np.uint64(multiplier)
+        for part in np.split(states, 10):
+            table.number(part)
+        assert (table.number(states) == np.arange(300)).all()
 
 
 def test_conditions_of_any_shape_become_cubes() -> None:
@@ -176,3 +209,22 @@ def test_conditions_over_several_words_hold_where_the_semantics_say(values: list
         test = space_packing.bit_test(packing, condition)
         expected = [evaluate(condition, bytes(row)) is Truth.TRUE for row in (values, values[::-1])]
         assert space_packing.holds(packing, test, rows).tolist() == expected
+
+
+@examples(100)
+@given(task=tasks(nested=2), every=st.integers(1, 3))
+def test_the_closure_is_what_a_walk_over_single_choices_finds(task: Task, every: int) -> None:
+    space = explore_space(task, Limits())
+    taken = np.arange(len(space.choice_action)) % every == 0
+    found, waiting = set(space.start.tolist()), space.start.tolist()
+    while waiting:
+        for choice in space.choices_of(np.array([waiting.pop()])).tolist():
+            for successor, _ in space.outcomes(choice) if taken[choice] else ():
+                if successor not in found:
+                    found.add(successor)
+                    waiting.append(successor)
+    closed = space.closure(space.start, taken).tolist()
+    assert len(closed) == len(set(closed))
+    assert set(closed) == found
+    if every == 1:
+        assert len(found) == len(space.states)

@@ -6,6 +6,7 @@ import itertools
 import time
 from fractions import Fraction
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 
@@ -15,12 +16,13 @@ from bbtc.ground.condition import Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.markov import solve
 from bbtc.planner.mdp.bounded_search import search_bounds
-from bbtc.planner.mdp.exact import solve
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
-from bbtc.planner.mdp.maxprob import Reachability, best_probability, reachability
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.ssp import least_cost
+from bbtc.planner.mdp.state_space import StateSpace
 from tests.plan.examples import Optimum, cases, corpus_optima
 from tests.plan.test_refine import action, task
 from tests.plan.test_space import by_simulator
@@ -30,8 +32,8 @@ from tests.strategies import tasks
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 
 
-def solved(of: Task) -> Reachability:
-    return reachability(explore_space(of, Limits()), Limits())
+def solved(of: Task) -> MaxProb:
+    return max_prob(explore_space(of, Limits()), Limits())
 
 
 # --- known optima ----------------------------------------------------------------------------
@@ -40,7 +42,7 @@ def solved(of: Task) -> Reachability:
 @pytest.mark.parametrize("case", cases(), ids=lambda c: c.name)
 def test_cases_have_their_listed_values(case: Optimum) -> None:
     space = explore_space(case.task(), Limits())
-    best = reachability(space, Limits()).initial.exact
+    best = max_prob(space, Limits()).initial.exact
     assert best is not None
     assert float(best) == pytest.approx(case.best, abs=1e-9)
     within = horizon_values(space, 12, Limits())
@@ -58,7 +60,7 @@ def test_public_problems_have_their_listed_values(problem: Optimum) -> None:
         pytest.skip(f"does not load: {error.diagnostics[0].message}")
     start = time.process_time()
     space = explore_space(of, Limits())
-    bounds = reachability(space, Limits()).initial
+    bounds = max_prob(space, Limits()).initial
     assert time.process_time() - start < 10
     assert float(bounds.lower) == pytest.approx(problem.best, abs=1e-6)
     assert float(bounds.upper) == pytest.approx(problem.best, abs=1e-6)
@@ -117,12 +119,11 @@ def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task)
     wins: list[Fraction] = []
     for state in range(graph.states):
         rows: dict[int, dict[int, Fraction]] = {}
-        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
+        for choice in space.choices_of(np.array([state])).tolist():
             row = rows.setdefault(choice, {})
-            for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
-                p = space.draws[space.edge_draw[edge]].probability
-                target = int(space.edge_target[edge])
-                row[target] = row.get(target, Fraction(0)) + p
+            for successor, draw in space.outcomes(choice):
+                p = space.draws[draw].probability
+                row[successor] = row.get(successor, Fraction(0)) + p
             expected = sum(p * values[t] for t, p in row.items())
             assert expected <= values[state]
             assert bool(found.best[choice]) == (values[state] > 0 and expected == values[state])
@@ -148,7 +149,7 @@ def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Ta
     for steps in (0, 1, 3, 8):
         expected = after_steps(of, choices, steps)
         assert list(within.values[steps]) == [expected[v] for v in values]
-    best = reachability(space, Limits()).initial.exact
+    best = max_prob(space, Limits()).initial.exact
     assert best is not None
     assert all(a.lower <= b.lower for a, b in itertools.pairwise(within.initial))
     assert within.initial[8].lower <= best
@@ -159,9 +160,9 @@ def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Ta
 def test_bounds_from_floats_hold_the_exact_values(of: Task) -> None:
     exact = solved(of)
     space = exact.space
-    floats = reachability(space, Limits(), rationals=False)
+    floats = max_prob(space, Limits(), rationals=False)
     horizon = horizon_values(space, 5, Limits(), rationals=False)
-    assert horizon.exact == (not len(space.edge_target))
+    assert horizon.exact == (not len(space.edge_successor))
     for state in range(len(space.states)):
         known, close = exact.bounds(state), floats.bounds(state)
         assert close.lower <= known.lower <= close.upper
@@ -171,12 +172,20 @@ def test_bounds_from_floats_hold_the_exact_values(of: Task) -> None:
         assert b.lower <= a.lower <= b.upper
 
 
+def best_probability(space: StateSpace, limits: Limits) -> Bounds:
+    """P* of the task; bounds where the space is incomplete."""
+    low = max_prob(space, limits).initial
+    if space.complete:
+        return low
+    return Bounds(low.lower, max_prob(space, limits, space.goal | space.fringe).initial.upper)
+
+
 @examples(100)
 @given(of=tasks())
 def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
     whole = explore_space(of, Limits())
     assume(len(whole.states) > 2)
-    known = reachability(whole, Limits()).initial.exact
+    known = max_prob(whole, Limits()).initial.exact
     assert known is not None
     for depth in (0, 1, 2):
         bounds = best_probability(explore_space(of, Limits(), depth), Limits())
@@ -194,17 +203,16 @@ def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
         return
     assert cheapest.exact
     space = found.space
-    open_states = [s for s in range(len(space.states)) if not found.zero[s] and not space.goal[s]]
+    open_states = [s for s in range(len(space.states)) if not found.prob_0[s] and not space.goal[s]]
     number = {s: i for i, s in enumerate(open_states)}
 
     def row(choice: int) -> tuple[Fraction, dict[int, Fraction]]:
         cost, chances = Fraction(0), dict[int, Fraction]()
-        for edge in range(space.edge_first[choice], space.edge_first[choice + 1]):
-            draw = space.draws[space.edge_draw[edge]]
+        for successor, drawn in space.outcomes(choice):
+            draw = space.draws[drawn]
             cost += draw.probability * draw.cost
-            target = int(space.edge_target[edge])
-            if target in number:
-                chances[number[target]] = chances.get(number[target], Fraction(0)) + draw.probability
+            if successor in number:
+                chances[number[successor]] = chances.get(number[successor], Fraction(0)) + draw.probability
         return cost, chances
 
     own = [row(int(cheapest.policy[s])) for s in open_states]
@@ -212,7 +220,7 @@ def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
     assert attained is not None
     for state, value in zip(open_states, attained, strict=True):
         assert cheapest.best[cheapest.policy[state]]
-        for choice in range(space.choice_first[state], space.choice_first[state + 1]):
+        for choice in space.choices_of(np.array([state])).tolist():
             if found.best[choice]:
                 cost, chances = row(choice)
                 total = cost + sum(p * attained[t] for t, p in chances.items())
@@ -256,7 +264,7 @@ def test_no_time_left_is_a_limit() -> None:
     space = explore_space(of, Limits())
     late = Limits(seconds=1e-9)
     with pytest.raises(LimitReached):
-        reachability(space, late)
+        max_prob(space, late)
 
 
 def test_a_large_loop_of_states_is_solved_exactly() -> None:

@@ -21,6 +21,7 @@ from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
 from bbtc.verifier.verdict import verify
 from tests.long_form import amount
+from tests.strategies import soda_tree
 from tests.verify.test_storm import ask, ask_about_jani
 
 HALF = Fraction(1, 2)
@@ -163,3 +164,11 @@ def test_what_is_certain_is_written_without_a_probability() -> None:
     certain = [line for line in commands if line.endswith(";")]
     assert len(certain) == len(commands) - 1, "but for the first step, which fails half the time"
     assert not [line for line in certain if " : " in line.split("->")[1]]
+
+
+def test_cells_are_explained_in_comments() -> None:
+    text = str(prism.export(soda_tree(), {"form": "walk"}, None))
+    (cell,) = (line for line in text.splitlines() if line.startswith("  at : ["))
+    assert cell.endswith(" // the leaf being ticked, from the left; then success, failure, blocked")
+    variables = [line for line in text.splitlines() if " : [0.." in line]
+    assert [line for line in variables if line.rstrip().endswith("//")] == []

@@ -24,7 +24,6 @@ from bbtc.verifier import storm, storm_worker
 from bbtc.verifier.chain import chain_of
 from bbtc.verifier.explore import explore
 from bbtc.verifier.naming import numbered
-from bbtc.verifier.optimum import best_probability
 from bbtc.verifier.prism import prism_text
 from bbtc.verifier.process import process_of
 from bbtc.verifier.verdict import TOLERANCE, verify
@@ -33,6 +32,7 @@ from tests.plan.examples import Optimum, cases
 from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.strategies import HOSTILE_NAMES, soda_tree, tasks, trees
+from tests.verify.optimum import best_probability
 from tests.verify.test_figures import FORMS
 
 pytest.importorskip("stormpy", reason="Storm is not installed: pip install 'bbtc[storm]'")

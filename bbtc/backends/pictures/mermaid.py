@@ -63,11 +63,11 @@ def _edge(parent: int, number: int, item: Item) -> str:
     return f'n{parent} {arrow}|"{_escaped(flow_text(item.flow))}"| n{number}'
 
 
-def _styles(items: tuple[Item, ...], targets: list[int]) -> list[str]:
+def _styles(items: tuple[Item, ...], children: list[int]) -> list[str]:
     kinds = sorted({item.kind for item in items})
     styles = [f"classDef {kind} fill:{FILL[kind]},color:{INK[kind]},stroke:{PEN}" for kind in kinds]
     styles += [f"style n{number} stroke-dasharray:4 3" for number, item in enumerate(items) if item.dashed]
-    unreached = [str(place) for place, number in enumerate(targets) if items[number].flow == 0]
+    unreached = [str(place) for place, number in enumerate(children) if items[number].flow == 0]
     if unreached:
         styles.append(f"linkStyle {','.join(unreached)} stroke:{UNREACHED},color:{UNREACHED}")
     return styles

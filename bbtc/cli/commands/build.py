@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 from bbtc.cli.counting import counted
-from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERNAL, EXIT_LIMIT
 from bbtc.cli.session import Session
 from bbtc.cli.session import command as session_command
 from bbtc.diagnostics import BbtcError
+from bbtc.exit_status import ExitStatus
 
 if TYPE_CHECKING:
     from bbtc.builder.runner import BuildReport, Tell
@@ -100,10 +100,10 @@ def _tell(session: Session, report: BuildReport, *, check: bool, quiet: bool) ->
 def _status(report: BuildReport) -> int:
     kinds = {outcome.failure for outcome in report.outcomes if outcome.status == "failed"}
     if "internal" in kinds:
-        return EXIT_INTERNAL
+        return ExitStatus.INTERNAL
     if "error" in kinds:
-        return EXIT_ERRORS
-    return EXIT_LIMIT if kinds else 0
+        return ExitStatus.ERRORS
+    return ExitStatus.LIMIT if kinds else 0
 
 
 def _bar(session: Session) -> Tell | None:

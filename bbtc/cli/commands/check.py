@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import click
 
+from bbtc.cli.counting import counted
 from bbtc.cli.session import Session, lenient_option, reading_limits
 from bbtc.cli.session import command as session_command
 from bbtc.codes import CODES
@@ -64,7 +65,6 @@ def command(
     them, as a warning.
     Errors are always shown. `bbtc explain CODE` tells more about a code.
     """
-    from bbtc.cli.wording import counted
     from bbtc.pipeline import check_documents, parse_all
 
     report = Report()

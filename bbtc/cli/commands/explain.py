@@ -39,6 +39,6 @@ def command(session: Session, code: str | None) -> None:  # noqa: ARG001
     """Explain what CODE (such as BBT0202) means, why it is reported, and how to mend it. Without
     CODE, list all codes."""
     if code is None:
-        show("".join(f"{each}  {title}\n" for each, title in CODES.items()), nl=False)
+        show("".join(f"{each.code}  {each.title}\n" for each in CODES.values()), nl=False)
     else:
         show(page(_code(code)), nl=False)

@@ -20,6 +20,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.exit_status import OF_TREE
 from bbtc.planner.strategies import DEFAULT
 from bbtc.printable import printable
 
@@ -73,7 +74,7 @@ def command(
     depfile: str | None,
 ) -> int:
     """Write TREE in FORMAT. With a DOMAIN and PROBLEM in its place, plan on the way."""
-    from bbtc.cli.commands.plan import STATUS_EXIT, best_tree_on_signals, run_planner
+    from bbtc.cli.commands.plan import best_tree_on_signals, run_planner
     from bbtc.cli.inputs import is_artefact, is_tree, task_of, tree_of
     from bbtc.pipeline import export_tree
     from bbtc.planner.options import DEFAULTS
@@ -101,7 +102,7 @@ def command(
         # Planning may have used all of the time: what was found gets some of its own.
         artefact = export_tree(tree, form, pairs, limits.afresh())
         session.write(output, artefact, check=check, depfile=depfile)
-    return STATUS_EXIT[tree.status]
+    return OF_TREE[tree.status]
 
 
 def require_place(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from bbtc.cli.counting import counted
 from bbtc.cli.session import Session, reading_limits
 from bbtc.cli.session import command as session_command
 from bbtc.diagnostics import BbtcError, LimitReached
@@ -21,7 +22,6 @@ def command(session: Session, files: tuple[str, ...], check: bool) -> None:
     Comments are kept. A file with syntax errors is left as it is, and so is one that has the layout
     already.
     """
-    from bbtc.cli.wording import counted
     from bbtc.files.read_write import drift, write
     from bbtc.pipeline import format_source
 

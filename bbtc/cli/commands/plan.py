@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import click
 
 from bbtc.cli.commands.verify import require_verified
-from bbtc.cli.main import EXIT_ERRORS, EXIT_INTERRUPTED, EXIT_LIMIT
 from bbtc.cli.session import (
     Count,
     Probability,
@@ -28,7 +27,8 @@ from bbtc.cli.session import (
     command as session_command,
 )
 from bbtc.diagnostics import LimitReached
-from bbtc.planner.strategies import DEFAULT
+from bbtc.exit_status import OF_TREE, ExitStatus
+from bbtc.planner.strategies import DEFAULT, others
 from bbtc.watch import importing
 
 if TYPE_CHECKING:
@@ -37,18 +37,9 @@ if TYPE_CHECKING:
     from bbtc.planner.options import Options, Retries
     from bbtc.planner.result import Plan, Refinement
     from bbtc.planner.why_not import DeadEnd
-    from bbtc.tree.nodes import Status
 
 _TELLING = 1.0
 """Seconds for finding out why a target is out of reach, which is told besides."""
-
-STATUS_EXIT: dict[Status, int] = {
-    "target-reached": 0,
-    "out-of-reach": EXIT_ERRORS,
-    "stuck": EXIT_LIMIT,
-    "limit-reached": EXIT_LIMIT,
-    "interrupted": EXIT_INTERRUPTED,
-}
 
 
 @click.command("plan")
@@ -56,14 +47,14 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option(
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
-@click.option("--strategy", default=DEFAULT, show_default=True, help="Or auto, search, policy, refine.")
+@click.option("--strategy", default=DEFAULT, show_default=True, help=f"Or {others()}.")
 @click.option("--max-actions", type=Count(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",
     type=click.Choice(["least", "unbounded"]),
     default="least",
     show_default=True,
-    help="Try again as often as the target takes, or without end (search, policy, auto).",
+    help=f"Try again as often as the target takes, or without end ({others(lambda each: each.retries)}).",
 )
 @click.option(
     "--guarded",
@@ -125,7 +116,7 @@ def command(
             require_verified(session, plan.tree)
         text = artefacts.dumps(artefacts.tree_to_json(plan.tree))
         session.write(output, text, check=check, depfile=depfile)
-    return STATUS_EXIT[plan.tree.status]
+    return OF_TREE[plan.tree.status]
 
 
 def _print_bounds(
@@ -143,8 +134,8 @@ def _print_bounds(
     if value.lower >= target:
         return 0
     if value.interrupted:
-        return EXIT_INTERRUPTED
-    return EXIT_ERRORS if value.upper < target else EXIT_LIMIT
+        return ExitStatus.INTERRUPTED
+    return ExitStatus.ERRORS if value.upper < target else ExitStatus.LIMIT
 
 
 def run_planner(
@@ -160,8 +151,9 @@ def run_planner(
 ) -> Plan:
     """Plan, telling the session each refinement as it is made and how planning ended. Afterwards neither a
     limit nor a signal keeps the tree from being written."""
+    from bbtc.artefacts.numbers import exact
     from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
-    from bbtc.cli.wording import exact, plan_summary, refinement_line, simplified_line
+    from bbtc.cli.wording import plan_summary, refinement_line, simplified_line
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
     from bbtc.planner.options import DEFAULTS

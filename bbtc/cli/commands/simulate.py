@@ -85,12 +85,13 @@ def command(
 
 
 def _scenario_lines(tree: Tree, listed: list[Scenario]) -> list[str]:
-    from bbtc.belief.tick import Status
-    from bbtc.cli.wording import exact, run_lines
+    from bbtc.artefacts.numbers import exact
+    from bbtc.belief.tick import NodeStatus
+    from bbtc.cli.wording import run_lines
 
     lines = []
     for number, run in enumerate(listed, 1):
-        ending = "blocked" if run.status is Status.RUNNING else run.status.word
+        ending = "blocked" if run.status is NodeStatus.RUNNING else run.status.word
         lines.append(f"run {number}: probability {exact(run.probability)}, {ending}")
         lines.extend(f"  {line}" for line in run_lines(tree, run))
     return lines

@@ -61,7 +61,9 @@ def require_verified(session: Session, tree: Tree) -> None:
 
 def verdict_report(verdict: Verdict) -> list[str]:
     """What was claimed and found, as lines of text."""
-    from bbtc.cli.wording import counted, exact, expected
+    from bbtc.artefacts.numbers import exact
+    from bbtc.cli.counting import counted
+    from bbtc.cli.wording import expected
 
     tree, own, found = verdict.tree, verdict.own, verdict.storm
     lines = [f"claimed   {exact(tree.success_probability)}"]

@@ -38,11 +38,7 @@ class Usage:
         self.model = model
         self.start = start
         self.blocks = {name: normalise(schema.effect) for name, schema in model.schemas.items()}
-        self.set_values: dict[str, set[Truth]] = {}
-        for block in self.blocks.values():
-            for item, _ in items(block, ()):
-                if isinstance(item.leaf, me.Set):
-                    self.set_values.setdefault(item.leaf.predicate, set()).add(item.leaf.value)
+        self.set_values = md.set_values(model)
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
         self.open = open_predicates(model)
@@ -113,23 +109,11 @@ def items(block: Block, around: tuple[Parameter, ...]) -> Iterator[tuple[Item, t
 def open_predicates(model: md.Model) -> frozenset[str]:
     """Predicates whose facts may change in the world, whatever the model's actions can reach: those that an
     effect mentions, and those declared as external."""
-    leaves = (leaf for schema in model.schemas.values() for leaf in me.leaves(schema.effect))
-    mentioned = {leaf.predicate for leaf in leaves if isinstance(leaf, me.Set)}
+    mentioned = {leaf.predicate for each in model.schemas.values() for leaf in me.settings(each.effect)}
     return frozenset(mentioned | {name for name, each in model.predicates.items() if each.external})
 
 
 def called(model: md.Model) -> set[str]:
     """Names of the schemas that template bodies call."""
     bodies = [template.body for template in model.templates.values()]
-    found: set[str] = set()
-    while bodies:
-        match bodies.pop():
-            case md.BodyCall("action", name):
-                found.add(name)
-            case md.BodyControl(_, children):
-                bodies.extend(children)
-            case md.BodyForeach(_, child):
-                bodies.append(child)
-            case _:
-                pass
-    return found
+    return {call.name for body in bodies for call in md.calls(body) if call.kind == "action"}

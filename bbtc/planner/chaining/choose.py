@@ -11,15 +11,17 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TypeAlias
 
+from typing_extensions import assert_never
+
 from bbtc.belief.state import State, Transition, Values, compile_action
-from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, variables
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts, evaluate, variables
 from bbtc.ground.task import GroundAction, Task, effects_of
-from bbtc.kleene import Truth
+from bbtc.kleene import Truth, negate
 from bbtc.limits import Limits
 from bbtc.planner.chaining.draft import Doing, Subgoal, changed_by
-from bbtc.planner.chaining.relaxed import RelaxedReachability, helpful, possible
+from bbtc.planner.mdp.h_add import Relaxation, possible
 
-OPEN_SHARE = Fraction(1, 2)
+OBSERVABLE_SHARE = Fraction(1, 2)
 """An outcome that leaves a false condition unknown counts this much: it may still be observed true."""
 
 UNMET_DISCOUNT = Fraction(4, 5)
@@ -30,9 +32,9 @@ _Tried: TypeAlias = tuple[frozenset[Condition], ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
-    """A failed condition: the subgoal, what it was (false or unknown), and the final states it
-    fails in, with their probabilities."""
+class Flaw:
+    """A failed condition (a flaw, as partial-order planning has it): the subgoal, what it was (false or
+    unknown), and the final states it fails in, with their probabilities."""
 
     subgoal: Subgoal
     value: Truth
@@ -49,15 +51,15 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Something that may resolve a target. ``success`` is the probability that the condition
-    holds (is known, where it was unknown) after it, over the target's states, ``open`` that it
+    """Something that may resolve a flaw. ``success`` is the probability that the condition
+    holds (is known, where it was unknown) after it, over the flaw's states, ``observable`` that it
     becomes unknown where it was false; ``conditions`` are what must hold first; ``unmet`` counts
     those that do not hold in some of the states."""
 
     doing: Doing | None
     conditions: tuple[Condition, ...]
     success: Fraction
-    open: Fraction
+    observable: Fraction
     unmet: int
     tried: int
 
@@ -74,7 +76,7 @@ class Candidate:
     @property
     def score(self) -> Fraction:
         """Probability of success, discounted for every unmet precondition."""
-        return (self.success + self.open * OPEN_SHARE) * UNMET_DISCOUNT**self.unmet
+        return (self.success + self.observable * OBSERVABLE_SHARE) * UNMET_DISCOUNT**self.unmet
 
     def rank(self) -> tuple[Fraction, int, Fraction, str]:
         """Sort key, best first: score, fewest tries, cost, name."""
@@ -83,13 +85,13 @@ class Candidate:
 
 
 class Chooser:
-    """Finds the candidates for a target; everything that depends on the task only is indexed once."""
+    """Finds the candidates for a flaw; everything that depends on the task only is indexed once."""
 
     def __init__(self, task: Task, transitions: dict[str, Transition], limits: Limits) -> None:
         self.task = task
         self.transitions = transitions
         self.limits = limits
-        self.reachability = RelaxedReachability(task, limits)
+        self.relaxation = Relaxation(task, limits)
         self._by_fact: dict[tuple[int, Truth], list[Doing]] = {}
         self._guides: dict[str, Transition] = {}
         self._helps: dict[tuple[Subgoal, _Tried, Truth, Values, frozenset[str]], bool] = {}
@@ -98,58 +100,58 @@ class Chooser:
             for fact in sorted({fact for effect in effects_of(doing.factors) for fact in effect.sets}):
                 self._by_fact.setdefault(fact, []).append(doing)
 
-    def helps(self, target: Target) -> bool:
-        """Is there any candidate for a target of one state?"""
-        ((state, _),) = target.states
-        key = (target.subgoal, tried_parts(target.subgoal), target.value, state.values, target.excluded)
+    def helps(self, flaw: Flaw) -> bool:
+        """Is there any candidate for a flaw of one state?"""
+        ((state, _),) = flaw.states
+        key = (flaw.subgoal, tried_parts(flaw.subgoal), flaw.value, state.values, flaw.excluded)
         if key not in self._helps:
-            self._helps[key] = bool(self.candidates(target))
+            self._helps[key] = bool(self.candidates(flaw))
         return self._helps[key]
 
-    def candidates(self, target: Target) -> list[Candidate]:
-        """Everything worth inserting for a target, best first; empty if nothing helps."""
-        goal = target.subgoal.condition
+    def candidates(self, flaw: Flaw) -> list[Candidate]:
+        """Everything worth inserting for a flaw, best first; empty if nothing helps."""
+        goal = flaw.subgoal.condition
         ongoing = {
             attempt.doing.name
-            for attempt in (target.subgoal.parent.ancestors() if target.subgoal.parent else ())
+            for attempt in (flaw.subgoal.parent.ancestors() if flaw.subgoal.parent else ())
             if attempt.doing is not None
         }
         doings: dict[str, Doing] = {}
-        for fact in helpful(goal, target.value):
+        for fact in helpful(goal, flaw.value):
             for doing in self._by_fact.get(fact, ()):
-                if doing.name not in ongoing and doing.name not in target.excluded:
+                if doing.name not in ongoing and doing.name not in flaw.excluded:
                     doings[doing.name] = doing
         found: list[Candidate] = []
         for doing in doings.values():
-            found.extend(self._variants(target, doing))
+            found.extend(self._variants(flaw, doing))
         if not found:
-            found = list(self._parts(target))
+            found = list(self._parts(flaw))
         return sorted(found, key=Candidate.rank)
 
-    def _variants(self, target: Target, doing: Doing) -> Iterator[Candidate]:
+    def _variants(self, flaw: Flaw, doing: Doing) -> Iterator[Candidate]:
         """The doing as it is, or, where its effect on the condition is guarded and the guard does
-        not hold in the target's states, with the guard as a further precondition."""
-        goal = target.subgoal.condition
+        not hold in the flaw's states, with the guard as a further precondition."""
+        goal = flaw.subgoal.condition
         conditions = conjuncts(doing.precondition)
-        if any(circular(condition, goal, target.value) for condition in conditions):
+        if any(circular(condition, goal, flaw.value) for condition in conditions):
             return
-        states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
+        states = [(s, p) for s, p in flaw.states if self._applicable(conditions, s)]
         if not states:
             return
-        tried = sum(a.doing is doing for a in target.subgoal.attempts())
-        chances = self._chances(doing, target, {}, states)
+        tried = sum(a.doing is doing for a in flaw.subgoal.attempts())
+        chances = self._chances(doing, flaw, {}, states)
         if any(chances):
             inserted = self._inserted(doing, conditions)
             yield Candidate(doing, inserted, *chances, _unmet(conditions, states), tried)
             return
         for guard in _guards(doing, frozenset(variables(goal))):
             more = (*conditions, *(c for c in conjuncts(guard) if c not in conditions))
-            if any(circular(c, goal, target.value) for c in more):
+            if any(circular(c, goal, flaw.value) for c in more):
                 continue
             reachable = [(s, p) for s, p in states if self._applicable(more, s)]
             forced = _forced(guard)
             if reachable and forced is not None:
-                chances = self._chances(doing, target, forced, reachable)
+                chances = self._chances(doing, flaw, forced, reachable)
                 if any(chances):
                     inserted = self._inserted(doing, more)
                     yield Candidate(doing, inserted, *chances, _unmet(more, reachable), tried)
@@ -163,13 +165,13 @@ class Chooser:
         return tuple(c for c in conditions if changed.isdisjoint(variables(c)))
 
     def _applicable(self, conditions: tuple[Condition, ...], state: State) -> bool:
-        facts = self.reachability.facts(state.values)
+        facts = self.relaxation.facts(state.values)
         return all(possible(condition, facts) for condition in conditions)
 
     def _chances(
         self,
         doing: Doing,
-        target: Target,
+        flaw: Flaw,
         forced: Mapping[int, Truth],
         states: list[tuple[State, Fraction]],
     ) -> tuple[Fraction, Fraction]:
@@ -178,19 +180,19 @@ class Chooser:
         that its guard asks for."""
         transition = self._transition(doing)
         success = observable = Fraction(0)
-        goal = target.subgoal.condition
+        goal = flaw.subgoal.condition
         for state, probability in states:
             values = bytearray(state.values)
             for variable, value in forced.items():
                 values[variable] = value
-            may_hold = possible(goal, self.reachability.facts(state.values))
+            may_hold = possible(goal, self.relaxation.facts(state.values))
             for result in transition(bytes(values)):
                 after = evaluate(goal, result.values)
-                if after is Truth.TRUE or (target.value is Truth.UNKNOWN and after is Truth.FALSE):
+                if after is Truth.TRUE or (flaw.value is Truth.UNKNOWN and after is Truth.FALSE):
                     success += probability * result.probability
-                elif after is Truth.UNKNOWN and target.value is Truth.FALSE and may_hold:
+                elif after is Truth.UNKNOWN and flaw.value is Truth.FALSE and may_hold:
                     observable += probability * result.probability
-        return success / target.probability, observable / target.probability
+        return success / flaw.probability, observable / flaw.probability
 
     def _transition(self, doing: Doing) -> Transition:
         store = self.transitions if isinstance(doing, GroundAction) else self._guides
@@ -202,30 +204,55 @@ class Chooser:
             store[doing.name] = compile_action(action, self.limits)
         return store[doing.name]
 
-    def _parts(self, target: Target) -> Iterator[Candidate]:
+    def _parts(self, flaw: Flaw) -> Iterator[Candidate]:
         """For a disjunction or a conjunction that no single action achieves: its parts as
         conditions to achieve one after the other."""
-        goal = target.subgoal.condition
+        goal = flaw.subgoal.condition
         if isinstance(goal, Or):
             parts = goal.parts
         elif isinstance(goal, And):
             parts = (goal,)
         else:
             return
-        tried = tried_parts(target.subgoal)
+        tried = tried_parts(flaw.subgoal)
         for part in parts:
             conditions = conjuncts(part)
-            states = [(s, p) for s, p in target.states if self._applicable(conditions, s)]
+            states = [(s, p) for s, p in flaw.states if self._applicable(conditions, s)]
             if states and frozenset(conditions) not in tried:
-                share = sum((p for _, p in states), Fraction(0)) / target.probability
+                share = sum((p for _, p in states), Fraction(0)) / flaw.probability
                 part_of_it = Candidate(None, conditions, share, Fraction(0), _unmet(conditions, states), 0)
-                if part_of_it.key not in target.excluded:
+                if part_of_it.key not in flaw.excluded:
                     yield part_of_it
 
 
 def tried_parts(subgoal: Subgoal) -> _Tried:
     """What each attempt at a subgoal asks for first: what was tried is not tried again."""
     return tuple(frozenset(p.condition for p in attempt.preconditions) for attempt in subgoal.attempts())
+
+
+def helpful(condition: Condition, value: Truth) -> Iterator[tuple[int, Truth]]:
+    """The assignments that can make a condition true that now has the value: those that may make a part
+    of it true, or unknown, so that it can be observed; of an unknown one, those that tell. Repeats are
+    included."""
+    match condition:
+        case Is(variable, Truth.UNKNOWN):
+            yield variable, Truth.UNKNOWN
+        case Is(variable, wanted):
+            yield variable, wanted
+            yield variable, negate(wanted) if value is Truth.UNKNOWN else Truth.UNKNOWN
+        case Known(variable):
+            yield variable, Truth.TRUE
+            yield variable, Truth.FALSE
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from helpful(part, value)
+        case Not(part):
+            for variable in variables(part):
+                yield from ((variable, each) for each in Truth)
+        case Constant():
+            return
+        case _:
+            assert_never(condition)
 
 
 def circular(condition: Condition, goal: Condition, value: Truth) -> bool:

@@ -9,11 +9,11 @@ from fractions import Fraction
 from bbtc.belief.chain import Chain
 from bbtc.belief.failures import Failing, FailureFinder
 from bbtc.belief.state import State
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.ground.condition import Condition, evaluate, variables
 from bbtc.ground.task import GroundTemplate, Task
 from bbtc.kleene import Truth
-from bbtc.planner.chaining.choose import Chooser, Target
+from bbtc.planner.chaining.choose import Chooser, Flaw
 from bbtc.planner.chaining.draft import Attempt, Frozen, Subgoal, changed_by
 from bbtc.tree.nodes import Node, actions_of
 
@@ -49,20 +49,20 @@ class Simulated:
             (
                 probability
                 for index, probability in self.mass.items()
-                if self.chain.status[index] is not Status.SUCCESS
+                if self.chain.status[index] is not NodeStatus.SUCCESS
                 and evaluate(condition, states[index].values) is value
             ),
             Fraction(0),
         )
 
-    def started(self, target: Target) -> frozenset[Attempt]:
-        """Attempts of which an action was started in some of a target's states."""
-        finished = _finished(target.states)
+    def started(self, flaw: Flaw) -> frozenset[Attempt]:
+        """Attempts of which an action was started in some of a flaw's states."""
+        finished = _finished(flaw.states)
         return frozenset(attempt for attempt, bits in self.bits.items() if bits & finished)
 
 
 @dataclass(slots=True)
-class TargetFinder:
+class FlawFinder:
     """Groups the failing final states of a draft by the condition to resolve in them.
 
     ``banned`` holds insertions that were tried and taken back.
@@ -73,8 +73,8 @@ class TargetFinder:
     banned: set[tuple[Subgoal, Truth, str]] = field(default_factory=set)
     _missing: dict[tuple[Attempt, Condition], Subgoal] = field(default_factory=dict)
 
-    def best(self, simulated: Simulated) -> Target | None:
-        """The most probable target; None if no insertion helps in any state.
+    def best(self, simulated: Simulated) -> Flaw | None:
+        """The most probable flaw; None if no insertion helps in any state.
 
         In each state it is the deepest failed condition that some insertion may still help there;
         a state in which none helps any of its failed conditions is given up.
@@ -82,7 +82,7 @@ class TargetFinder:
         finder = FailureFinder(self.task, simulated.root)
         groups: dict[tuple[Subgoal, Truth], list[tuple[State, Fraction]]] = {}
         for index, probability in simulated.mass.items():
-            if simulated.chain.status[index] is Status.SUCCESS or not probability:
+            if simulated.chain.status[index] is NodeStatus.SUCCESS or not probability:
                 continue
             state = simulated.chain.states[index]
             for failing in finder.failing(state):
@@ -90,18 +90,16 @@ class TargetFinder:
                 if subgoal is None:
                     continue
                 value = evaluate(subgoal.condition, state.values)
-                here = self._target(simulated, subgoal, value, [(state, probability)])
+                here = self._flaw(simulated, subgoal, value, [(state, probability)])
                 if value is not Truth.TRUE and self.chooser.helps(here):
                     groups.setdefault((subgoal, value), []).append((state, probability))
                     break
-        targets = [
-            self._target(simulated, subgoal, value, states) for (subgoal, value), states in groups.items()
-        ]
-        return max(targets, key=lambda target: target.probability, default=None)
+        flaws = [self._flaw(simulated, subgoal, value, states) for (subgoal, value), states in groups.items()]
+        return max(flaws, key=lambda flaw: flaw.probability, default=None)
 
-    def _target(
+    def _flaw(
         self, simulated: Simulated, subgoal: Subgoal, value: Truth, states: list[tuple[State, Fraction]]
-    ) -> Target:
+    ) -> Flaw:
         finished = _finished(states)
         attempts = subgoal.sensing if value is Truth.UNKNOWN else subgoal.acting
         excluded = {
@@ -110,7 +108,7 @@ class TargetFinder:
             if attempt.doing is not None and not simulated.bits.get(attempt, 0) & finished
         }
         excluded.update(name for at, of, name in self.banned if at is subgoal and of is value)
-        return Target(subgoal, value, tuple(states), frozenset(excluded))
+        return Flaw(subgoal, value, tuple(states), frozenset(excluded))
 
     def _subgoal(self, simulated: Simulated, failing: Failing, state: State) -> Subgoal | None:
         """The subgoal a failing node stands for, unless it only guards what has run already."""

@@ -18,9 +18,9 @@ from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, n
 from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.planner.chaining.choose import circular
+from bbtc.planner.chaining.choose import circular, helpful
 from bbtc.planner.chaining.draft import Attempt, Draft, Subgoal
-from bbtc.planner.chaining.relaxed import Costs, Facts, RelaxedReachability, helpful
+from bbtc.planner.mdp.h_add import Costs, Facts, Relaxation
 from bbtc.rounding import rounded
 
 _MOST_STEPS = 200
@@ -66,7 +66,7 @@ class Moves:
     def __init__(self, task: Task, limits: Limits) -> None:
         self.task = task
         self.limits = limits
-        self.relaxed = RelaxedReachability(task, limits)
+        self.relaxed = Relaxation(task, limits)
 
     def insertions(self, subgoals: Iterable[Subgoal], draft: Draft, values: Values) -> list[Insertion]:
         """What may be inserted for any of some subgoals that are not true in a state, best first."""
@@ -191,11 +191,6 @@ class _Plan:
                         stack.extend([] if operator.when is None else [operator.when])
                 case _:
                     pass
-
-    def harms(self, condition: Condition) -> bool:
-        """Does it set something that makes the condition false?"""
-        against = set(_literals(negation(condition)))
-        return not against.isdisjoint(self.sets)
 
     def trouble_before(self, other: _Plan) -> int:
         """How bad is it to carry this plan out before the other? 3: the other makes this condition false

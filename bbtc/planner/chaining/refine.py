@@ -1,4 +1,5 @@
-"""The paper's Algorithm 3: refine a tree until its simulation reaches the target.
+"""The strategy ``refine``: backward chaining by the paper's Algorithm 3, which refines a tree until its
+simulation reaches the target.
 
 Steps, numbered as in the paper: 1 simulate; 2 find the most probable deepest failed condition;
 3 if an action of a later branch undid it, move that branch; 4 otherwise insert an action or a
@@ -18,7 +19,7 @@ from fractions import Fraction
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
 from bbtc.belief.state import Transition
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import evaluate
 from bbtc.ground.describe import describe
@@ -26,15 +27,14 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
-from bbtc.planner.chaining.choose import Candidate, Chooser, Target
+from bbtc.planner.chaining.choose import Candidate, Chooser, Flaw
 from bbtc.planner.chaining.draft import Draft, Subgoal, freeze, new_attempt
-from bbtc.planner.chaining.flaws import Simulated, TargetFinder
+from bbtc.planner.chaining.flaws import FlawFinder, Simulated
 from bbtc.planner.chaining.threats import find_threat
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement
-from bbtc.rewrite.prune import without_idle_branches
-from bbtc.tree.nodes import Status as PlanStatus
-from bbtc.tree.nodes import walk
+from bbtc.rewrite.simplify import without_idle_branches
+from bbtc.tree.nodes import PlanStatus, walk
 
 PATIENCE = 30
 """So many refinements may pass without progress before they are taken back."""
@@ -62,7 +62,7 @@ class _Refiner:
     limits: Limits
     draft: Draft
     transitions: dict[str, Transition]
-    finder: TargetFinder
+    finder: FlawFinder
     moved: set[tuple[Subgoal, Subgoal]] = field(default_factory=set)
 
     def simulate(self) -> Simulated:
@@ -72,7 +72,7 @@ class _Refiner:
         chain = explore(self.task, frozen.root, self.limits, self.transitions)
         visits = Absorption(chain).visits()
         mass = {state: visits[state] or Fraction(0) for state in chain.final}
-        success = sum((p for s, p in mass.items() if chain.status[s] is Status.SUCCESS), Fraction(0))
+        success = sum((p for s, p in mass.items() if chain.status[s] is NodeStatus.SUCCESS), Fraction(0))
         goals = Fraction(0)
         if len(self.draft.goals) > 1:
             conditions = [goal.condition for goal in self.draft.goals]
@@ -83,26 +83,26 @@ class _Refiner:
 
     def refine_once(self, simulated: Simulated) -> _Change | None:
         """Steps 2 to 4; None if nothing is left to insert."""
-        target = self.finder.best(simulated)
-        if target is None:
+        flaw = self.finder.best(simulated)
+        if flaw is None:
             return None
-        common = (describe(self.task, target.subgoal.condition), target.value, target.probability)
-        threat = find_threat(self.draft, target, simulated.started(target), self.moved)
+        common = (describe(self.task, flaw.subgoal.condition), flaw.value, flaw.probability)
+        threat = find_threat(self.draft, flaw, simulated.started(flaw), self.moved)
         if threat is not None:
             self.moved.add((threat.siblings[threat.earlier], threat.siblings[threat.later]))
             threat.resolve()
             return _Change(Refinement("move", *common, threat.action), threat.take_back, None)
-        best = self.finder.chooser.candidates(target)[0]
-        undo = self.insert(target, best)
-        refinement = Refinement("insert", *common, best.name, best.success, best.open, best.unmet)
-        return _Change(refinement, undo, (target.subgoal, target.value, best.key))
+        best = self.finder.chooser.candidates(flaw)[0]
+        undo = self.insert(flaw, best)
+        refinement = Refinement("insert", *common, best.name, best.success, best.observable, best.unmet)
+        return _Change(refinement, undo, (flaw.subgoal, flaw.value, best.key))
 
-    def insert(self, target: Target, candidate: Candidate) -> Callable[[], None]:
-        """Put the candidate under the target: a perception under a Skipper where the condition is
+    def insert(self, flaw: Flaw, candidate: Candidate) -> Callable[[], None]:
+        """Put the candidate under the flaw: a perception under a Skipper where the condition is
         unknown, an actuation under a Fallback where it is false. Returns how to take it out again."""
-        subgoal = target.subgoal
+        subgoal = flaw.subgoal
         attempt = new_attempt(subgoal, candidate.doing, list(candidate.conditions))
-        attempts = subgoal.sensing if target.value is Truth.UNKNOWN else subgoal.acting
+        attempts = subgoal.sensing if flaw.value is Truth.UNKNOWN else subgoal.acting
         attempts.append(attempt)
         siblings = subgoal.parent.preconditions if subgoal.parent is not None else self.draft.goals
         attached = subgoal not in siblings
@@ -152,7 +152,7 @@ def refine(
     draft = Draft.start(task)
     kept = BestTree.start(task, target, options.best, freeze(draft, limits).root, limits)
     transitions: dict[str, Transition] = {}
-    finder = TargetFinder(task, Chooser(task, transitions, limits))
+    finder = FlawFinder(task, Chooser(task, transitions, limits))
     refiner = _Refiner(task, target, limits, draft, transitions, finder)
     refinements: list[Refinement] = []
     status: PlanStatus = "stuck"

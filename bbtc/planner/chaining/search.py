@@ -1,4 +1,4 @@
-"""The strategy ``search``: a best-first search over refinements of reactive trees.
+"""The strategy ``search``: backward chaining by best-first search over refinements of reactive trees.
 
 A tree grows from the goal by backward chaining (Colledanchise, Almeida, Ögren, "Towards Blended
 Reactive Planning and Acting using Behavior Trees", 2019): a condition that is false gets an action under a
@@ -15,7 +15,8 @@ Of a small task the search first finds what any policy can reach, and looks for 
    that leads into a dead end is backed out of. Of the others, the one comes first whose refinements were
    ranked best when they were chosen.
 3. If runs go round in a circle, branches that undo one another are put into another order; otherwise the
-   most probable repairable state gets an insertion, cheapest in the relaxation first (:mod:`search_moves`).
+   most probable repairable state gets an insertion, cheapest in the relaxation first
+   (:mod:`bbtc.planner.chaining.moves`).
 4. Where the target is reached, the tree is made smaller: what does not change any run, and then
    alternatives that the target does not need. Then attempts are bounded.
 """
@@ -31,7 +32,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import FailureFinder
 from bbtc.belief.state import Transition, Values, compile_action
-from bbtc.belief.tick import Status
+from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import evaluate
 from bbtc.ground.describe import describe
@@ -41,14 +42,14 @@ from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.chaining.draft import Attempt, Draft, Frozen, Subgoal, freeze, new_attempt
 from bbtc.planner.chaining.moves import Insertion, Move, Moves, forward, separating
-from bbtc.planner.chaining.relaxed import possible
 from bbtc.planner.finish import GRACE, finish
 from bbtc.planner.mdp.explore import explore_space
-from bbtc.planner.mdp.maxprob import reachability
+from bbtc.planner.mdp.h_add import possible
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement
 from bbtc.rewrite.simplify import size
-from bbtc.tree.nodes import Status as PlanStatus
+from bbtc.tree.nodes import PlanStatus
 
 MOST_TREES = 400
 """Trees simulated in one search."""
@@ -85,7 +86,7 @@ class _Seen:
 
 
 @dataclass(frozen=True, slots=True)
-class _Open:
+class _Node:
     """A refinement not yet made: of which tree (None: the first), and what it is."""
 
     above: _Seen | None
@@ -106,16 +107,16 @@ class _Search:
     trees: int = 0
     states: int = 0
     known: set[tuple[object, ...]] = field(default_factory=set)
-    heap: list[tuple[Fraction, int, int, int, _Open | tuple[_Open, _Seen]]] = field(default_factory=list)
+    heap: list[tuple[Fraction, int, int, int, _Node | tuple[_Node, _Seen]]] = field(default_factory=list)
     order: count[int] = field(default_factory=count)
 
     def run(self) -> None:
         """Search until the target is reached, nothing is left, or enough was tried."""
         self.moves = Moves(self.task, self.limits)
-        self.push(_Open(None, None, 0, ()), Fraction(1))
+        self.push(_Node(None, None, 0, ()), Fraction(1))
         while self.heap and self.trees < MOST_TREES and self.states < MOST_STATES:
             shortfall, discrepancy, depth, _, entry = heapq.heappop(self.heap)
-            if isinstance(entry, _Open):
+            if isinstance(entry, _Node):
                 seen = self.simulate(entry)
                 if seen is None:
                     continue
@@ -135,13 +136,13 @@ class _Search:
                 entry, seen = entry
             self.expand(entry, seen)
 
-    def push(self, entry: _Open, reachable: Fraction) -> None:
+    def push(self, entry: _Node, reachable: Fraction) -> None:
         key = (-min(reachable, self.target), entry.discrepancy, -len(entry.steps), next(self.order))
         heapq.heappush(self.heap, (*key, entry))
 
     # --- one tree ----------------------------------------------------------------------------
 
-    def simulate(self, entry: _Open) -> _Seen | None:
+    def simulate(self, entry: _Node) -> _Seen | None:
         """Make the refinement and simulate; None for a tree seen before, and for one too large."""
         draft = self.refined(entry)
         self.limits.check_time("planning")
@@ -165,8 +166,8 @@ class _Search:
         absorption = Absorption(chain)
         visits = absorption.visits()
         ends = [(visits[state] or Fraction(0), state) for state in chain.final]
-        success = sum((p for p, state in ends if chain.status[state] is Status.SUCCESS), Fraction(0))
-        failing = [(p, state) for p, state in ends if p and chain.status[state] is not Status.SUCCESS]
+        success = sum((p for p, state in ends if chain.status[state] is NodeStatus.SUCCESS), Fraction(0))
+        failing = [(p, state) for p, state in ends if p and chain.status[state] is not NodeStatus.SUCCESS]
         endless = 1 - sum((p for p, _ in ends), Fraction(0))
         lost = sum((p for p, state in failing if not self.hopeful(chain.states[state].values)), Fraction(0))
         started = dict.fromkeys(chain.actions[chain.action[state]].id for state in sorted(absorption.endless))
@@ -184,7 +185,7 @@ class _Search:
     def hopeful(self, values: Values) -> bool:
         return possible(self.task.goal, self.moves.relaxed.facts(values))
 
-    def refined(self, entry: _Open) -> Draft:
+    def refined(self, entry: _Node) -> Draft:
         """A copy of the tree's draft with the refinement made."""
         if entry.above is None:
             draft = Draft.start(self.task, reactive=True)
@@ -207,7 +208,7 @@ class _Search:
 
     # --- what next ---------------------------------------------------------------------------
 
-    def expand(self, entry: _Open, seen: _Seen) -> None:
+    def expand(self, entry: _Node, seen: _Seen) -> None:
         changes: list[tuple[Insertion | Move, Values]] = []
         if seen.circling:
             changes.extend((move, b"") for move in separating(seen.draft, seen.circling))
@@ -225,7 +226,7 @@ class _Search:
                 changes.extend((insertion, values) for insertion in found)
                 break
         for rank, (change, values) in enumerate(changes):
-            self.push(_Open(seen, change, entry.discrepancy + rank, entry.steps, values), seen.reachable)
+            self.push(_Node(seen, change, entry.discrepancy + rank, entry.steps, values), seen.reachable)
 
     def told(self, above: _Seen, change: Insertion | Move | None, values: Values, now: _Seen) -> Refinement:
         """The refinement in the terms of reports."""
@@ -305,7 +306,7 @@ def possible_target(task: Task, target: Fraction, limits: Limits) -> Fraction:
     try:
         space = explore_space(task, replace(limits, states=min(limits.states, _FEW_STATES)))
         if space.complete:
-            return min(target, reachability(space, limits).initial.upper)
+            return min(target, max_prob(space, limits).initial.upper)
     except LimitReached:
         limits.check_time("planning")
     return target

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from bbtc.ground.condition import evaluate
 from bbtc.ground.task import Effect, GroundAction, GroundTemplate, Task, effects_of
 from bbtc.kleene import Truth
-from bbtc.planner.chaining.choose import Target
+from bbtc.planner.chaining.choose import Flaw
 from bbtc.planner.chaining.draft import Attempt, Draft, Subgoal, actions_in
 
 
@@ -37,15 +37,15 @@ class Threat:
 
 def find_threat(
     draft: Draft,
-    target: Target,
+    flaw: Flaw,
     started: frozenset[Attempt],
     moved: set[tuple[Subgoal, Subgoal]],
 ) -> Threat | None:
-    """The innermost threat to a target among the attempts that were ``started`` in its states, if
+    """The innermost threat to a flaw among the attempts that were ``started`` in its states, if
     the pair of branches was not ``moved`` before (in either direction)."""
-    if target.value is not Truth.FALSE:
+    if flaw.value is not Truth.FALSE:
         return None
-    subgoal = target.subgoal
+    subgoal = flaw.subgoal
     while True:
         siblings = subgoal.parent.preconditions if subgoal.parent is not None else draft.goals
         # (A precondition found missing stands among its siblings only once it is resolved.)
@@ -56,7 +56,7 @@ def find_threat(
             if pair in moved or pair[::-1] in moved:
                 continue
             for attempt in _attempts(siblings[later]):
-                if attempt in started and undoes(draft.task, attempt, target):
+                if attempt in started and undoes(draft.task, attempt, flaw):
                     assert attempt.doing is not None
                     return Threat(siblings, earlier, later, attempt.doing.name)
         if subgoal.parent is None:
@@ -64,11 +64,11 @@ def find_threat(
         subgoal = subgoal.parent.subgoal
 
 
-def undoes(task: Task, attempt: Attempt, target: Target) -> bool:
-    """Can what was attempted make the target's condition other than true, as it is in its states?"""
-    condition = target.subgoal.condition
+def undoes(task: Task, attempt: Attempt, flaw: Flaw) -> bool:
+    """Can what was attempted make the flaw's condition other than true, as it is in its states?"""
+    condition = flaw.subgoal.condition
     for effect in _effects(task, attempt):
-        for state, _ in target.states:
+        for state, _ in flaw.states:
             # The state without the effect: was the condition true before these values were set?
             values = bytearray(state.values)
             for variable, value in effect.sets:

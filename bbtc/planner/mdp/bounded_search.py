@@ -2,11 +2,11 @@
 
 Bounded search with a whole batch of states at a time, in the spirit of LAO* (Hansen and Zilberstein
 2001) and bounded real-time dynamic programming (Brázdil et al. 2014). The part of the space that was
-expanded is solved twice: with the open states lost, which gives a lower bound and a policy that
+expanded is solved twice: with the fringe states lost, which gives a lower bound and a policy that
 attains it, and with those won that are not dead ends for sure, which gives an upper bound. End
 components are merged by the solver, so both are sound and close whatever loops there are.
 
-1. Solve. 2. Stop when the bounds have met. 3. Find the open states that runs of the optimistic policy
+1. Solve. 2. Stop when the bounds have met. 3. Find the fringe states that runs of the optimistic policy
 end in; among the choices that are equally good by the bounds it prefers what is solved, then the way
 to the goal that the heuristic thinks short. 4. Expand them, the most probable first, and from there
 greedily after the heuristic, a share of what was expanded before; repeat.
@@ -22,11 +22,12 @@ import numpy as np
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.planner.mdp.explore import Choices, Explorer, StateSpace, ranges
-from bbtc.planner.mdp.graph import Floats, Graph, Number, sums
-from bbtc.planner.mdp.h_add import Costs, Heuristic
-from bbtc.planner.mdp.maxprob import Bounds, Reachability, draw_probabilities, reachability
+from bbtc.planner.mdp.explore import Choices, Explorer
+from bbtc.planner.mdp.graph import Floats, Graph, sums
+from bbtc.planner.mdp.h_add import Costs, Relaxation
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, draw_probabilities, max_prob
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
 
 _CLOSED = 1e-9  # bounds this close have met
@@ -46,7 +47,7 @@ class Searched:
     policy attains the lower bound), and the bounds on P*. ``stop`` says which limit ended it before
     the bounds met, if one did; ``interrupted`` tells that the user did."""
 
-    lower: Reachability
+    lower: MaxProb
     bounds: Bounds
     stop: Diagnostic | None
     interrupted: bool = False
@@ -61,8 +62,8 @@ class Searched:
 class _Solved:
     space: StateSpace
     graph: Graph
-    lower: Reachability
-    upper: Reachability
+    lower: MaxProb
+    upper: MaxProb
 
     @property
     def bounds(self) -> Bounds:
@@ -83,7 +84,7 @@ class _Search:
     def __init__(self, task: Task, limits: Limits, target: Fraction | None, step: int) -> None:
         self.limits, self.target, self.step = limits, target, step
         self.explorer = Explorer(task, limits)
-        self.heuristic = Heuristic(task, self.explorer.packing)
+        self.heuristic = Relaxation(task, limits, count_actions=True)
         self.probability = np.empty(0)
         self.guess: Costs = np.empty(0, dtype=np.float32)
         self.closed: Flags = np.empty(0, dtype=np.bool_)
@@ -96,7 +97,7 @@ class _Search:
         solved = self._solve()
         stop: Diagnostic | None = None
         try:
-            while not self._done(solved.bounds) and solved.space.open.any():
+            while not self._done(solved.bounds) and solved.space.fringe.any():
                 frontier, mass = self._frontier(solved)
                 if not len(frontier):
                     break  # the optimistic policy is a policy, and the bounds met but for rounding
@@ -116,11 +117,11 @@ class _Search:
         return bounds.upper - bounds.lower <= _CLOSED
 
     def _solve(self) -> _Solved:
-        space = self.explorer.space(~self.closed, (), None)
+        space = self.explorer.space(~self.closed, None)
         graph = Graph(space)
-        lower = reachability(space, self.limits, graph=graph, rationals=False)
-        hope = space.goal | space.open
-        upper = reachability(space, self.limits, hope, graph=graph, rationals=False)
+        lower = max_prob(space, self.limits, graph=graph, rationals=False)
+        hope = space.goal | space.fringe
+        upper = max_prob(space, self.limits, hope, graph=graph, rationals=False)
         solved = _Solved(space, graph, lower, upper)
         bounds = solved.bounds
         self.limits.tell(
@@ -138,12 +139,12 @@ class _Search:
         """The last solution once more, in rationals where that is possible."""
         lower, bounds = solved.lower, solved.bounds
         try:
-            lower = reachability(solved.space, self.limits, graph=solved.graph)
+            lower = max_prob(solved.space, self.limits, graph=solved.graph)
             low = max(bounds.lower, lower.initial.lower)
             bounds = Bounds(low, max(low, bounds.upper))
             if bounds.exact is None and bounds.upper - low <= _CLOSED:
-                hope = solved.space.goal | solved.space.open
-                upper = reachability(solved.space, self.limits, hope, graph=solved.graph).initial.upper
+                hope = solved.space.goal | solved.space.fringe
+                upper = max_prob(solved.space, self.limits, hope, graph=solved.graph).initial.upper
                 bounds = Bounds(low, max(low, min(bounds.upper, upper)))
         except LimitReached:
             pass
@@ -152,23 +153,23 @@ class _Search:
     # --- what to expand --------------------------------------------------------------------------
 
     def _frontier(self, solved: _Solved) -> tuple[Index, Floats]:
-        """The open states that runs of the optimistic policy end in, the most probable first, and
+        """The fringe states that runs of the optimistic policy end in, the most probable first, and
         how probable they are."""
         space, graph, lower, upper = solved.space, solved.graph, solved.lower, solved.upper
         allowed = upper.best.copy()
-        met = (lower.lower >= upper.upper - _CLOSED) & ~upper.zero & ~space.goal
+        met = (lower.lower >= upper.upper - _CLOSED) & ~upper.prob_0 & ~space.goal
         allowed[met[graph.choice_state]] = False
         own = lower.policy[met]
         allowed[own[own >= 0]] = True
-        ahead = np.where(space.open, np.minimum(self.guess, _FAR), 0).astype(np.int32)
-        via = graph.reach(space.goal | space.open, allowed, ahead).via
+        ahead = np.where(space.fringe, np.minimum(self.guess, _FAR), 0).astype(np.int32)
+        via = graph.reach(space.goal | space.fringe, allowed, ahead).via
         states, mass = _followed(space, via)
-        found = np.flatnonzero(space.open[states])
+        found = np.flatnonzero(space.fringe[states])
         found = found[np.argsort(-mass[found], kind="stable")]
         return states[found], mass[found]
 
     def _plunge(self, frontier: Index, mass: Floats) -> None:
-        """Expand open states, and from each follow the choice that the heuristic prefers."""
+        """Expand fringe states, and from each follow the choice that the heuristic prefers."""
         budget = max(self.step, self.expanded // _SHARE)
         least = self.expanded + (self.expanded // _LEAST_SHARE if self._solved_often() else 0)
         share = max(1, self.step // 4, budget // 2)
@@ -200,7 +201,7 @@ class _Search:
         return done
 
     def _next(self, found: Choices, states: Index, weights: Floats) -> tuple[Index, Floats]:
-        """The open states that the preferred choices lead to, and how probable they are."""
+        """The fringe states that the preferred choices lead to, and how probable they are."""
         if not len(found.owner):
             return np.empty(0, dtype=np.int64), np.empty(0)
         draws = self.explorer.tables.draws
@@ -209,26 +210,26 @@ class _Search:
         count = len(found.owner)
         choice = np.repeat(np.arange(count), found.edges)
         weight = self.probability[found.draw]
-        loops = found.target == found.owner[choice]
+        loops = found.successor == found.owner[choice]
         onward = np.maximum(1e-12, sums(choice[~loops], weight[~loops], count))
-        ahead = np.minimum(self.guess[found.target], _FAR).astype(np.float64)
+        ahead = np.minimum(self.guess[found.successor], _FAR).astype(np.float64)
         total = (1 + sums(choice[~loops], (weight * ahead)[~loops], count)) / onward
         order = np.lexsort((np.arange(count), total, found.owner))
         first = np.ones(count, dtype=np.bool_)
         np.not_equal(found.owner[order][1:], found.owner[order][:-1], out=first[1:])
         best = np.zeros(count, dtype=np.bool_)
         best[order[first]] = True
-        edges = best[choice] & ~self.closed[found.target]
+        edges = best[choice] & ~self.closed[found.successor]
         arrived = weights[np.searchsorted(states, found.owner)][choice] * (weight / onward[choice])
-        targets, place = np.unique(found.target[edges], return_inverse=True)
-        return targets, sums(place, arrived[edges], len(targets))
+        successors, place = np.unique(found.successor[edges], return_inverse=True)
+        return successors, sums(place, arrived[edges], len(successors))
 
     def _note(self) -> None:
         """Take the states that were found since into account."""
         known, count = len(self.guess), self.explorer.count
         if known == count:
             return
-        guess = self.heuristic.estimate(self.explorer.table.states[known:count])
+        guess = self.heuristic.estimate(self.explorer.packing, self.explorer.table.states[known:count])
         self.guess = np.concatenate([self.guess, guess])
         self.closed = np.concatenate([self.closed, np.isinf(guess)]) | self.explorer.goal()
 
@@ -236,26 +237,16 @@ class _Search:
 def _followed(space: StateSpace, via: Number) -> tuple[Index, Floats]:
     """The states that runs visit which take the choices of ``via``, and the probability of being
     there after some steps (of having ended there, where a state has no choice)."""
+    taken = np.zeros(len(space.choice_state), dtype=np.bool_)
+    taken[via[via >= 0]] = True
+    states = space.closure(space.start, taken)
+    count = len(states)
     number = np.full(len(space.states), -1, dtype=np.int64)
-    found: list[Index] = []
-    frontier: Index = np.unique([state for _, state in space.initial]).astype(np.int64)
-    count = 0
-    while len(frontier):
-        number[frontier] = count + np.arange(len(frontier))
-        count += len(frontier)
-        found.append(frontier)
-        choices = via[frontier]
-        choices = choices[choices >= 0]
-        edges = ranges(space.edge_first[choices], space.edge_first[choices + 1] - space.edge_first[choices])
-        targets = np.unique(space.edge_target[edges]).astype(np.int64)
-        frontier = targets[number[targets] < 0]
-    states = np.concatenate(found)
+    number[states] = np.arange(count)
     moving = np.flatnonzero(via[states] >= 0)
-    choices = via[states[moving]]
-    counts = space.edge_first[choices + 1] - space.edge_first[choices]
-    edges = ranges(space.edge_first[choices], counts)
-    source = np.repeat(moving, counts)
-    target = number[space.edge_target[edges]]
+    edges = space.edges_of(via[states[moving]])
+    source = number[space.choice_state[space.edge_choice[edges]]]
+    successor = number[space.edge_successor[edges]]
     weight = draw_probabilities(space)[edges]
     mass = np.zeros(count)
     for probability, state in space.initial:
@@ -263,7 +254,7 @@ def _followed(space: StateSpace, via: Number) -> tuple[Index, Floats]:
     resting = np.ones(count, dtype=np.bool_)
     resting[moving] = False
     for _ in range(_SWEEPS):
-        after = np.where(resting, mass, 0.0) + sums(target, mass[source] * weight, count)
+        after = np.where(resting, mass, 0.0) + sums(successor, mass[source] * weight, count)
         if np.abs(after - mass).max() < 1e-6:
             break
         mass = after

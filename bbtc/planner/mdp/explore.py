@@ -1,4 +1,4 @@
-"""The states of a task that any policy can reach, as a Markov decision process in flat arrays.
+"""Exploration: the states of a task that any policy can reach, as a Markov decision process.
 
 States are those of the paper without latches: a truth value for every variable. Goal states are
 final. States are expanded many at a time, in any order; results are exact, with outcomes kept by
@@ -8,7 +8,6 @@ number and their probabilities as rationals.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -19,53 +18,13 @@ from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import BitTest, Flags, Packing, Words, bit_test, holds
+from bbtc.planner.mdp.state_space import StateSpace, ranges
 from bbtc.planner.mdp.state_table import StateTable
-from bbtc.planner.mdp.transitions import ActionTables, Draw, Index
+from bbtc.planner.mdp.transitions import ActionTables, Index
 
 _CELLS = 1 << 19  # array cells worked on at a time
 _EDGE = 400  # bytes that an edge takes, for a word, while it is found
 _LEAST_ROOM = 4 << 20  # bytes of memory without which no state is expanded
-
-
-@dataclass(frozen=True, slots=True)
-class StateSpace:
-    """A Markov decision process. State s has the choices ``choice_first[s]:choice_first[s + 1]``,
-    choice c the edges ``edge_first[c]:edge_first[c + 1]``. Choices that never leave their state
-    are left out.
-
-    ``open`` are the states that were found, but not expanded, because of a limit (``stop``) or the
-    depth asked for, or because they did not seem to matter. ``levels[d]`` is the first state that
-    takes ``d`` actions to reach, where the space was explored breadth first.
-    """
-
-    task: Task
-    packing: Packing
-    states: Words
-    goal: Flags
-    open: Flags
-    levels: tuple[int, ...]
-    choice_first: Index
-    choice_action: npt.NDArray[np.int32]
-    edge_first: Index
-    edge_target: npt.NDArray[np.int32]
-    edge_draw: npt.NDArray[np.int32]
-    draws: tuple[Draw, ...]
-    initial: tuple[tuple[Fraction, int], ...]
-    stop: Diagnostic | None
-
-    @property
-    def expanded(self) -> int:
-        """How many states were expanded (goal states among them)."""
-        return len(self.open) - int(self.open.sum())
-
-    @property
-    def complete(self) -> bool:
-        """Was everything reachable found?"""
-        return not self.open.any()
-
-    def action_name(self, choice: int) -> str:
-        """The name of the action of a choice."""
-        return self.task.actions[int(self.choice_action[choice])].name
 
 
 @dataclass(slots=True)
@@ -92,7 +51,7 @@ class Choices(NamedTuple):
     owner: Index
     action: Index
     edges: Index
-    target: Index
+    successor: Index
     draw: Index
 
 
@@ -110,7 +69,7 @@ class Explorer:
         self._in_order = True
         self._last = -1
         self._owner, self._action = _Column(np.int32), _Column(np.int32)
-        self._edges, self._target, self._draw = _Column(np.int64), _Column(np.int32), _Column(np.int32)
+        self._edges, self._successor, self._draw = _Column(np.int64), _Column(np.int32), _Column(np.int32)
         self.choices = self.edges = 0
         self._most_edges = 1  # of a state, on average over a batch
         self._step = max(1, _CELLS // (32 * self.tables.width))
@@ -183,7 +142,7 @@ class Explorer:
         kept = np.zeros(len(rows), dtype=np.bool_)
         kept[owner[moves]] = True
         edges = kept[owner]
-        self._target.add(self.table.number(after[edges]))
+        self._successor.add(self.table.number(after[edges]))
         self._draw.add(draws[edges])
         self._edges.add(np.bincount(owner[edges], minlength=len(rows))[kept])
         self._action.add(actions[kept])
@@ -221,37 +180,36 @@ class Explorer:
 
     def since(self, mark: int) -> Choices:
         """The choices found since a moment."""
-        columns = (self._owner, self._action, self._edges, self._target, self._draw)
+        columns = (self._owner, self._action, self._edges, self._successor, self._draw)
         empty = np.empty(0, dtype=np.int32)
-        owner, action, edges, target, draw = (
+        owner, action, edges, successor, draw = (
             np.concatenate([empty, *column.pieces[mark:]]).astype(np.int64) for column in columns
         )
-        return Choices(owner, action, edges, target, draw)
+        return Choices(owner, action, edges, successor, draw)
 
-    def space(self, open_states: Flags, levels: tuple[int, ...], stop: Diagnostic | None) -> StateSpace:
-        """What was found so far; ``open_states`` says which states count as not expanded."""
+    def space(self, fringe: Flags, stop: Diagnostic | None) -> StateSpace:
+        """What was found so far; ``fringe`` says which states count as not expanded."""
         owner = np.asarray(self._owner.joined(), dtype=np.int32)
         action = np.asarray(self._action.joined(), dtype=np.int32)
         edge_count = np.asarray(self._edges.joined(), dtype=np.int64)
-        target = np.asarray(self._target.joined(), dtype=np.int32)
+        successor = np.asarray(self._successor.joined(), dtype=np.int32)
         draw = np.asarray(self._draw.joined(), dtype=np.int32)
         if not self._in_order:  # sort the choices by state
             order = np.argsort(owner, kind="stable")
             firsts = np.cumsum(edge_count) - edge_count
             edges = ranges(firsts[order], edge_count[order])
             owner, action, edge_count = owner[order], action[order], edge_count[order]
-            target, draw = target[edges], draw[edges]
+            successor, draw = successor[edges], draw[edges]
         return StateSpace(
             task=self.task,
             packing=self.packing,
             states=self.table.states.copy(),
             goal=self.goal(),
-            open=open_states,
-            levels=levels,
-            choice_first=_firsts(np.bincount(owner, minlength=self.count)),
+            fringe=fringe,
+            choice_state=owner,
             choice_action=action,
-            edge_first=_firsts(edge_count),
-            edge_target=target,
+            edge_choice=np.repeat(np.arange(len(owner), dtype=np.int32), edge_count),
+            edge_successor=successor,
             edge_draw=draw,
             draws=tuple(self.tables.draws),
             initial=self.initial,
@@ -266,30 +224,14 @@ def explore_space(task: Task, limits: Limits, depth: int | None = None) -> State
     """
     explorer = Explorer(task, limits)
     stop: Diagnostic | None = None
-    levels = [0]
-    done = 0
+    done = steps = 0
     try:
-        while done < explorer.count and (depth is None or len(levels) <= depth):
+        while done < explorer.count and (depth is None or steps < depth):
             level_end = explorer.count
             while done < level_end:
                 done += explorer.expand(np.arange(done, level_end), limits)
-            levels.append(level_end)
+            steps += 1
     except LimitReached as reached:
         stop = reached.diagnostics[0]
-    open_states = np.arange(explorer.count) >= done
-    return explorer.space(open_states & ~explorer.goal(), tuple(levels), stop)
-
-
-def ranges(firsts: Index, counts: Index) -> Index:
-    """The concatenation of ``range(first, first + count)`` over all pairs."""
-    ends = np.cumsum(counts)
-    total = int(ends[-1]) if len(ends) else 0
-    found: Index = np.arange(total) + np.repeat(firsts - (ends - counts), counts)
-    return found
-
-
-def _firsts(counts: Index) -> Index:
-    """Start positions from counts, and the end."""
-    firsts = np.zeros(len(counts) + 1, dtype=np.int64)
-    np.cumsum(counts, out=firsts[1:])
-    return firsts
+    fringe = np.arange(explorer.count) >= done
+    return explorer.space(fringe & ~explorer.goal(), stop)

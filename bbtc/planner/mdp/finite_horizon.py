@@ -1,4 +1,5 @@
-"""The best probability of reaching the goal with at most k actions, by backward induction."""
+"""MaxProb within a finite horizon: the best probability of reaching the goal with at most k actions, by
+backward induction (Puterman, "Markov decision processes", 1994)."""
 
 from __future__ import annotations
 
@@ -8,10 +9,10 @@ from fractions import Fraction
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.explore import StateSpace
 from bbtc.planner.mdp.graph import Floats, Graph, sums
 from bbtc.planner.mdp.maxprob import Bounds, draw_probabilities
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.rounding import rounded
 
 _MOST_EXACT = 400_000  # edges times steps that are summed in rationals
@@ -39,7 +40,7 @@ def horizon_values(
 
     Raises ``LimitReached`` when the time is over.
     """
-    if len(space.edge_target) * steps <= (_MOST_EXACT if rationals else 0):
+    if len(space.edge_successor) * steps <= (_MOST_EXACT if rationals else 0):
         return _exact(space, steps, limits, space.goal if goal is None else goal)
     graph = Graph(space)
     weight = draw_probabilities(space)
@@ -50,7 +51,7 @@ def horizon_values(
     found = [values]
     for _ in range(steps):
         limits.check_time("backward induction")
-        attained = sums(graph.edge_choice, weight * values[space.edge_target], graph.choices)
+        attained = sums(graph.edge_choice, weight * values[space.edge_successor], graph.choices)
         after = values.copy()
         after[live] = np.maximum(values[live], np.maximum.reduceat(attained, first))
         values = after
@@ -65,26 +66,18 @@ def horizon_values(
 
 def _exact(space: StateSpace, steps: int, limits: Limits, aims: Flags) -> Horizon:
     table = [draw.probability for draw in space.draws]
-    targets = space.edge_target.tolist()
-    probabilities = [table[draw] for draw in space.edge_draw.tolist()]
-    choices = space.choice_first.tolist()
-    edges = space.edge_first.tolist()
+    choices = [
+        (state, [(table[draw], successor) for successor, draw in space.outcomes(choice)])
+        for choice, state in enumerate(space.choice_state.tolist())
+    ]
     values = [_ONE if goal else _ZERO for goal in aims.tolist()]
     found = [values]
     for _ in range(steps):
         limits.check_time("backward induction")
         after = list(values)
-        for state in range(len(values)):
-            for choice in range(choices[state], choices[state + 1]):
-                value = sum(
-                    (
-                        probabilities[e] * values[targets[e]]
-                        for e in range(edges[choice], edges[choice + 1])
-                        if values[targets[e]]
-                    ),
-                    _ZERO,
-                )
-                after[state] = max(after[state], value)
+        for state, outcomes in choices:
+            value = sum((p * values[successor] for p, successor in outcomes if values[successor]), _ZERO)
+            after[state] = max(after[state], value)
         values = after
         found.append(values)
     initial = tuple(
@@ -101,15 +94,14 @@ def best_choices(horizon: Horizon, graph: Graph, step: int) -> Flags:
         flags = np.zeros(graph.choices, dtype=np.bool_)
         for choice in range(graph.choices):
             value = _ZERO
-            for edge in range(int(space.edge_first[choice]), int(space.edge_first[choice + 1])):
-                part = before[int(space.edge_target[edge])]
-                if part:
-                    value += space.draws[int(space.edge_draw[edge])].probability * part
+            for successor, draw in space.outcomes(choice):
+                if before[successor]:
+                    value += space.draws[draw].probability * before[successor]
             flags[choice] = value == after[int(graph.choice_state[choice])]
         return flags
     floats = np.asarray(horizon.values[step - 1])
     weight = draw_probabilities(space)
-    attained = sums(graph.edge_choice, weight * floats[space.edge_target], graph.choices)
+    attained = sums(graph.edge_choice, weight * floats[space.edge_successor], graph.choices)
     best: Flags = attained >= np.asarray(horizon.values[step])[graph.choice_state] - 1e-12
     return best
 
@@ -126,7 +118,7 @@ def cheapest_choices(horizon: Horizon, graph: Graph, best: list[Flags]) -> list[
     for step, attained in enumerate(best, 1):
         hopeless = np.asarray(horizon.values[step], dtype=np.float64) == 0
         usable = attained & ~hopeless[graph.choice_state]
-        total = own + sums(graph.edge_choice, weight * cost[space.edge_target], graph.choices)
+        total = own + sums(graph.edge_choice, weight * cost[space.edge_successor], graph.choices)
         least = np.full(graph.states, np.inf)
         np.minimum.at(least, graph.choice_state[usable], total[usable])
         found.append(usable & (total <= least[graph.choice_state] + 1e-9))

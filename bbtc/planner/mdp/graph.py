@@ -1,8 +1,8 @@
-"""Graph questions about a state space that need no numbers: what can reach the goal, what can
-reach it for sure, and in which sets of states a policy can stay for ever.
+"""Qualitative reachability in a Markov decision process, which needs no numbers: where the best probability
+of reaching the goal is 0 (prob-0), where it is 1 (prob-1), and the maximal end components, sets of states in
+which a policy can stay for ever.
 
-Source: Baier and Katoen, "Principles of Model Checking" (2008), section 10.6 (the sets where the
-maximal probability is 0 or 1, and end components).
+Source: Baier and Katoen, "Principles of Model Checking" (2008), section 10.6.
 """
 
 from __future__ import annotations
@@ -13,19 +13,17 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc.markov import components
-from bbtc.planner.mdp.explore import StateSpace, ranges
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number, StateSpace, ranges
 from bbtc.planner.mdp.transitions import Index
 
 Floats = npt.NDArray[np.float64]
-Number = npt.NDArray[np.int32]
-"""Numbers of states or choices."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reached:
     """Result of a backward search. ``depth[s]`` is how many choices of ``via`` it takes at least to
-    be in the targets (0 there, -1 where they cannot be reached); ``via[s]`` is the first choice that
+    be in the goals (0 there, -1 where they cannot be reached); ``via[s]`` is the first choice that
     may lead one step closer, -1 where there is none or none is needed."""
 
     depth: Number
@@ -33,35 +31,30 @@ class Reached:
 
     @property
     def found(self) -> Flags:
-        """The states that can reach the targets."""
+        """The states that can reach the goals."""
         return self.depth >= 0
 
 
 class Graph:
-    """A state space with its edges sorted by target, too."""
+    """A state space with its edges sorted by successor, too."""
 
     def __init__(self, space: StateSpace) -> None:
         self.space = space
         self.states = len(space.states)
         self.choices = len(space.choice_action)
-        counts = np.diff(space.choice_first)
-        self.choice_state: Number = np.repeat(np.arange(self.states, dtype=np.int32), counts)
-        """The state of each choice."""
-        self.edge_choice: Number = np.repeat(
-            np.arange(self.choices, dtype=np.int32), np.diff(space.edge_first)
-        )
-        """The choice of each edge."""
-        order = np.argsort(space.edge_target, kind="stable")
+        self.choice_state = space.choice_state
+        self.edge_choice = space.edge_choice
+        order = np.argsort(space.edge_successor, kind="stable")
         self._into: Number = self.edge_choice[order]
-        counts = np.bincount(space.edge_target, minlength=self.states)
+        counts = np.bincount(space.edge_successor, minlength=self.states)
         self._into_first: Index = np.concatenate(([0], np.cumsum(counts)))
 
-    def reach(self, targets: Flags, allowed: Flags | None = None, ahead: Number | None = None) -> Reached:
-        """What may reach the targets by allowed choices (all by default). ``ahead`` tells how many
-        steps each target counts for itself; 0 by default."""
+    def reach(self, goals: Flags, allowed: Flags | None = None, ahead: Number | None = None) -> Reached:
+        """What may reach the goals by allowed choices (all by default); the rest is prob-0. ``ahead`` tells
+        how many steps each goal counts for itself; 0 by default."""
         depth = np.full(self.states, -1, dtype=np.int32)
         via = np.full(self.states, -1, dtype=np.int32)
-        waiting = np.flatnonzero(targets)
+        waiting = np.flatnonzero(goals)
         if ahead is not None:
             waiting = waiting[np.argsort(ahead[waiting], kind="stable")]
             due, first = np.unique(ahead[waiting], return_index=True)
@@ -97,29 +90,29 @@ class Graph:
     def into(self, states: Flags) -> Flags:
         """Choices with an edge into a set of states."""
         hit = np.zeros(self.choices, dtype=np.bool_)
-        hit[self.edge_choice[states[self.space.edge_target]]] = True
+        hit[self.edge_choice[states[self.space.edge_successor]]] = True
         return hit
 
-    def surely(self, targets: Flags, some: Reached | None = None) -> Reached:
-        """Where the targets can be reached with probability 1, with choices that do so and never
-        leave that set. ``some`` is what :meth:`reach` finds for the targets, if that is known."""
-        reached = self.reach(targets) if some is None else some
+    def prob_1(self, goals: Flags, some: Reached | None = None) -> Reached:
+        """Where the goals can be reached with probability 1, with choices that do so and never leave that
+        set: a strong cyclic policy (Cimatti et al. 2003). ``some`` is what :meth:`reach` finds for the
+        goals, if that is known."""
+        reached = self.reach(goals) if some is None else some
         while True:
             lost = ~reached.found
             safe = ~self.into(lost)
-            again = self.reach(targets, safe)
+            again = self.reach(goals, safe)
             if (again.found == reached.found).all():
                 return again
             reached = again
 
     def end_components(self, staying: Flags) -> list[list[int]]:
-        """Maximal sets of states in which a policy can stay for ever by choices of ``staying``
-        (it must be able to reach all of the set from all of it)."""
+        """Maximal end components: sets of states in which a policy can stay for ever by choices of
+        ``staying`` (it must be able to reach all of the set from all of it)."""
         staying = staying.copy()
         while True:
             # Drop choices that may lead where there is no such choice, until none is left.
-            has = np.zeros(self.states, dtype=np.bool_)
-            has[self.choice_state[staying]] = True
+            has = self.space.having(staying)
             dropped = staying & self.into(~has)
             if dropped.any():
                 staying &= ~dropped
@@ -131,15 +124,15 @@ class Graph:
             number[members] = np.arange(len(members))
             edges = staying[self.edge_choice]
             sources = self.choice_state[self.edge_choice[edges]]
-            targets = self.space.edge_target[edges]
+            after = self.space.edge_successor[edges]
             successors: list[list[int]] = [[] for _ in members]
-            for source, target in zip(number[sources].tolist(), number[targets].tolist(), strict=True):
-                successors[source].append(target)
+            for source, successor in zip(number[sources].tolist(), number[after].tolist(), strict=True):
+                successors[source].append(successor)
             found = components(successors)
             component = np.full(self.states, -1, dtype=np.int64)
             for position, group in enumerate(found):
                 component[members[group]] = position
-            across = component[sources] != component[targets]
+            across = component[sources] != component[after]
             if not across.any():
                 return sorted(sorted(int(members[m]) for m in group) for group in found)
             staying[self.edge_choice[edges][across]] = False

@@ -1,9 +1,9 @@
-"""P*: the best probability with which any policy ever reaches the goal, state by state.
+"""MaxProb: the best probability with which any policy ever reaches the goal, P*, state by state.
 
-1. States with value 0 and 1 are found in the graph (:mod:`bbtc.planner.mdp.graph`).
+1. States with value 0 and 1 are found in the graph (prob-0 and prob-1, :mod:`bbtc.planner.mdp.graph`).
 2. For the others, interval iteration closes in from below and, with end components merged to
-   single states, from above (Haddad and Monmege 2018). Rounding is accounted for, so that the
-   bounds hold.
+   single states, from above (Haddad and Monmege 2018), by Bellman updates of all states. Rounding is
+   accounted for, so that the bounds hold.
 3. Where the numbers are modest, the policy found is solved in rationals and improved until no
    choice is better: then its value is P* exactly, for it is reached by a policy and, being a
    solution of the optimality inequalities, an upper bound for all of them (Park induction; it
@@ -19,10 +19,10 @@ import numpy as np
 
 from bbtc.diagnostics import LimitReached
 from bbtc.limits import Limits
-from bbtc.planner.mdp.exact import solve
-from bbtc.planner.mdp.explore import StateSpace
-from bbtc.planner.mdp.graph import Floats, Graph, Number, sums
+from bbtc.markov import Row, solve
+from bbtc.planner.mdp.graph import Floats, Graph, sums
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -30,6 +30,7 @@ _UNIT = 2.0**-53
 _TIE = 1e-9  # floats closer than this may be equal
 _CLOSE = 1e-12  # bounds this close are not worth further sweeps
 _MOST_EXACT = 300_000  # edges of a system that is solved in rationals
+_MOST_WORK = 400_000  # elimination steps of one loop of states
 _CHECK_EVERY = 16  # sweeps between two looks at the bounds
 
 
@@ -47,10 +48,10 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Reachability:
+class MaxProb:
     """P* of every state of a complete space.
 
-    ``one`` and ``zero`` are the states with these values; ``lower`` and ``upper`` bound the value
+    ``prob_1`` and ``prob_0`` are the states with these values; ``lower`` and ``upper`` bound the value
     of every state; ``exact`` holds the values of the other states, if they were found exactly.
     ``best[c]`` tells that choice c attains its state's value (where not exact: as far as floats
     tell). ``policy[s]`` is a choice for every state with positive value; following it attains P*.
@@ -58,8 +59,8 @@ class Reachability:
 
     space: StateSpace
     graph: Graph
-    one: Flags
-    zero: Flags
+    prob_1: Flags
+    prob_0: Flags
     lower: Floats
     upper: Floats
     exact: dict[int, Fraction] | None
@@ -68,8 +69,8 @@ class Reachability:
 
     def bounds(self, state: int) -> Bounds:
         """The value of one state."""
-        if self.one[state] or self.zero[state]:
-            value = _ONE if self.one[state] else _ZERO
+        if self.prob_1[state] or self.prob_0[state]:
+            value = _ONE if self.prob_1[state] else _ZERO
             return Bounds(value, value)
         if self.exact is not None:
             return Bounds(self.exact[state], self.exact[state])
@@ -91,14 +92,14 @@ def draw_probabilities(space: StateSpace) -> Floats:
     return found
 
 
-def reachability(
+def max_prob(
     space: StateSpace,
     limits: Limits,
     goal: Flags | None = None,
     *,
     graph: Graph | None = None,
     rationals: bool = True,
-) -> Reachability:
+) -> MaxProb:
     """P* of reaching ``goal`` (by default the task's) in the part of a space that was expanded.
 
     ``graph`` is the space's, if it was made before; without ``rationals`` the values of states that
@@ -107,9 +108,9 @@ def reachability(
     """
     limits.check_time("the search for the best probability")
     graph = Graph(space) if graph is None else graph
-    targets = space.goal if goal is None else goal
-    reached = graph.reach(targets)
-    some, surely = reached.found, graph.surely(targets, reached)
+    goals = space.goal if goal is None else goal
+    reached = graph.reach(goals)
+    some, surely = reached.found, graph.prob_1(goals, reached)
     one, maybe = surely.found, some & ~surely.found
     lower, upper = one.astype(np.float64), some.astype(np.float64)
     best = np.zeros(graph.choices, dtype=np.bool_)
@@ -129,7 +130,7 @@ def reachability(
             values = np.array([float(exact[s]) for s in part.states.tolist()])
             best[part.choices] = part.exact_ties(exact, values)
             lower[part.states] = upper[part.states] = values
-    return Reachability(space, graph, one, ~some, lower, upper, exact, best, policy)
+    return MaxProb(space, graph, one, ~some, lower, upper, exact, best, policy)
 
 
 class _Part:
@@ -148,10 +149,10 @@ class _Part:
         edges = np.flatnonzero(choice_number[graph.edge_choice] >= 0)
         weight = draw_probabilities(space)[edges]
         owner = choice_number[graph.edge_choice[edges]]
-        target = space.edge_target[edges]
-        inner = maybe[target]
-        self.win = sums(owner, weight * one[target], len(self.choices))
-        self.edge_choice, self.edge_target = owner[inner], self.number[target[inner]]
+        successor = space.edge_successor[edges]
+        inner = maybe[successor]
+        self.win = sums(owner, weight * one[successor], len(self.choices))
+        self.edge_choice, self.edge_successor = owner[inner], self.number[successor[inner]]
         self.weight = weight[inner]
         self.degree = int(np.bincount(owner).max()) + 2 if len(owner) else 2
         # States come in order, and so do their choices: the first choice of each state.
@@ -159,13 +160,13 @@ class _Part:
         self.one = one
 
     def choice_values(self, values: Floats) -> Floats:
-        """The value of each choice, given those of the states."""
-        part = sums(self.edge_choice, self.weight * values[self.edge_target], len(self.choices))
+        """The Q-value of each choice, given the values of the states."""
+        part = sums(self.edge_choice, self.weight * values[self.edge_successor], len(self.choices))
         found: Floats = self.win + part
         return found
 
-    def sweep(self, values: Floats) -> Floats:
-        """One step of value iteration."""
+    def update(self, values: Floats) -> Floats:
+        """The Bellman update of every state: one step of value iteration."""
         found: Floats = np.maximum.reduceat(self.choice_values(values), self.first)
         return found
 
@@ -177,7 +178,7 @@ class _Part:
     def merge(self, values: Floats) -> tuple[Index, Flags] | None:
         """End components merged: for each state its group, and the choices that may leave it.
         None if there are none."""
-        away = np.abs(values[self.edge_target] - values[self.choice_state[self.edge_choice]]) > 1e-6
+        away = np.abs(values[self.edge_successor] - values[self.choice_state[self.edge_choice]]) > 1e-6
         staying = np.zeros(self.graph.choices, dtype=np.bool_)
         staying[self.choices] = True
         staying[self.choices[self.edge_choice[away]]] = False  # equal values all over a component
@@ -191,7 +192,8 @@ class _Part:
         for component in found:
             group[self.number[component]] = self.number[component[0]]
         leaves = leaving[self.choices]
-        leaves[self.edge_choice[group[self.edge_target] != group[self.choice_state[self.edge_choice]]]] = True
+        across = group[self.edge_successor] != group[self.choice_state[self.edge_choice]]
+        leaves[self.edge_choice[across]] = True
         return group, leaves
 
     # --- rationals -------------------------------------------------------------------------------
@@ -202,13 +204,12 @@ class _Part:
         space = self.graph.space
         win = _ZERO
         row: dict[int, Fraction] = {}
-        for edge in range(int(space.edge_first[choice]), int(space.edge_first[choice + 1])):
-            target = int(space.edge_target[edge])
-            p = space.draws[int(space.edge_draw[edge])].probability
-            number = int(self.number[target])
+        for successor, draw in space.outcomes(choice):
+            p = space.draws[draw].probability
+            number = int(self.number[successor])
             if number >= 0:
-                row[number] = row.get(number, _ZERO) + p
-            elif self.one[target]:
+                row[number] = row[number] + p if number in row else p
+            elif self.one[successor]:
                 win += p
         return win, row
 
@@ -216,7 +217,7 @@ class _Part:
         """P* of every state by policy iteration in rationals, starting from a policy that reaches
         the goal from everywhere with positive probability; ``policy`` is improved in place. None
         if that is too much work, or the time is over."""
-        if len(self.edge_target) > _MOST_EXACT or (policy[self.states] < 0).any():
+        if len(self.edge_successor) > _MOST_EXACT or (policy[self.states] < 0).any():
             return None
         try:
             while True:
@@ -225,7 +226,7 @@ class _Part:
                     if count % 1024 == 0:
                         limits.check_time("the exact solution")
                     rows.append(self.row(choice))
-                values = solve([row for _, row in rows], [win for win, _ in rows], limits)
+                values = solved(rows, limits)
                 if values is None:
                     return None
                 if not self._improve(policy, values, limits):
@@ -252,9 +253,9 @@ class _Part:
         return bool(gain)
 
     def exact_value(self, choice: int, values: list[Fraction]) -> Fraction:
-        """The value of a choice, given those of the states by local number."""
+        """The Q-value of a choice, given the values of the states by local number."""
         win, row = self.row(choice)
-        return win + sum((p * values[target] for target, p in row.items()), _ZERO)
+        return win + sum((p * values[successor] for successor, p in row.items()), _ZERO)
 
     def exact_ties(self, exact: dict[int, Fraction], floats: Floats) -> Flags:
         """Choices that attain the value of their state."""
@@ -274,7 +275,7 @@ def _iterate(part: _Part, limits: Limits) -> tuple[Floats, Floats]:
     while True:  # from below
         before = low
         for _ in range(_CHECK_EVERY):
-            low = part.sweep(low)
+            low = part.update(low)
         sweeps += _CHECK_EVERY
         if float((low - before).max()) < _CLOSE or _time_is_over(limits):
             break
@@ -301,13 +302,11 @@ def _iterate(part: _Part, limits: Limits) -> tuple[Floats, Floats]:
     return lower, upper
 
 
-def best_probability(space: StateSpace, limits: Limits) -> Bounds:
-    """P* of the task; bounds where the space is incomplete. Raises ``LimitReached`` as
-    :func:`reachability` does."""
-    low = reachability(space, limits).initial
-    if space.complete:
-        return low
-    return Bounds(low.lower, reachability(space, limits, space.goal | space.open).initial.upper)
+def solved(system: list[tuple[Fraction, Row]], limits: Limits) -> list[Fraction] | None:
+    """The exact values of a chain, of which each state has a constant and a row; None if that is too much
+    work. Raises ``LimitReached`` when the time is over."""
+    rows, constant = [row for _, row in system], [own for own, _ in system]
+    return solve(rows, constant, most_work=_MOST_WORK, look=lambda: limits.check_time("the exact solution"))
 
 
 def _time_is_over(limits: Limits) -> bool:

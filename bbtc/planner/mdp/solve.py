@@ -11,9 +11,10 @@ from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.mdp.bounded_search import search_bounds
-from bbtc.planner.mdp.explore import StateSpace, explore_space
+from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
-from bbtc.planner.mdp.maxprob import Bounds, Reachability, reachability
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
+from bbtc.planner.mdp.state_space import StateSpace
 
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space
 _BEFORE_VALUES = 1 / 2  # of the time, for exploration within a number of actions
@@ -25,7 +26,7 @@ class Best:
     ``stop`` is the limit that left the bounds apart, if one did; ``interrupted`` tells that the user
     did."""
 
-    found: Reachability
+    found: MaxProb
     bounds: Bounds
     stop: Diagnostic | None = None
     interrupted: bool = False
@@ -45,7 +46,7 @@ def best_known(task: Task, limits: Limits, target: Fraction | None = None, *, wh
     """
     space = explore_space(task, limits if whole else limits.part(_SHARE))
     if space.complete:
-        found = reachability(space, limits)
+        found = max_prob(space, limits)
         return Best(found, found.initial)
     if whole:
         assert space.stop is not None
@@ -73,5 +74,5 @@ def best_within(task: Task, limits: Limits, max_actions: int) -> BestWithin:
         return BestWithin(horizon, horizon.initial[-1], None)
     upper = Fraction(1)
     with contextlib.suppress(LimitReached):
-        upper = horizon_values(space, max_actions, limits, space.goal | space.open).initial[-1].upper
+        upper = horizon_values(space, max_actions, limits, space.goal | space.fringe).initial[-1].upper
     return BestWithin(horizon, Bounds(horizon.initial[-1].lower, upper), space.stop)

@@ -1,4 +1,4 @@
-"""The least expected cost among the policies that attain P*: a stochastic shortest path.
+"""The least expected cost among the policies that attain P*: a stochastic shortest path problem (SSP).
 
 A policy may use the choices that attain P* and must end, in a goal or where the goal is out of
 reach. Policy iteration starts from one that ends and switches on strict improvement only; with
@@ -15,10 +15,10 @@ from fractions import Fraction
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.exact import solve
-from bbtc.planner.mdp.graph import Floats, Number, sums
-from bbtc.planner.mdp.maxprob import Reachability, draw_probabilities
+from bbtc.planner.mdp.graph import Floats, sums
+from bbtc.planner.mdp.maxprob import MaxProb, draw_probabilities, solved
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number
 from bbtc.rounding import rounded
 
 _ZERO = Fraction(0)
@@ -30,7 +30,7 @@ _TIE = 1e-9
 @dataclass(frozen=True, slots=True)
 class LeastCost:
     """``initial`` is the least expected cost from the initial belief (``exact`` tells whether it is
-    exactly that), ``values`` that of every state, ``policy`` a choice for each open state that
+    exactly that), ``values`` that of every state, ``policy`` a choice for each transient state that
     attains it, ``best`` all such choices. Costs until the goal, or until it is out of reach."""
 
     initial: Fraction
@@ -40,7 +40,7 @@ class LeastCost:
     best: Flags
 
 
-def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None = None) -> LeastCost | None:
+def least_cost(found: MaxProb, limits: Limits, costs: list[Fraction] | None = None) -> LeastCost | None:
     """The least expected cost; None where a cost is negative or P* is not known well enough.
 
     ``costs`` gives the cost of each draw; by default, the action's cost and its outcome's. Raises
@@ -52,11 +52,11 @@ def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None
     table = [draw.cost for draw in space.draws] if costs is None else costs
     if any(table[draw] < 0 for draw in np.unique(space.edge_draw)):
         return None
-    open_states = ~found.zero & ~space.goal
-    if not open_states.any():
+    transient = ~found.prob_0 & ~space.goal
+    if not transient.any():
         empty = np.full(graph.states, -1, dtype=np.int32)
         return LeastCost(_ZERO, True, np.zeros(graph.states), empty, np.zeros(graph.choices, dtype=np.bool_))
-    system = _System(found, table, open_states)
+    system = _System(found, table, transient)
     start = found.policy.copy()
     values = system.improve_floats(start, limits)
     policy = system.policy_from(values)
@@ -73,22 +73,22 @@ def least_cost(found: Reachability, limits: Limits, costs: list[Fraction] | None
 
 
 class _System:
-    def __init__(self, found: Reachability, table: list[Fraction], open_states: Flags) -> None:
+    def __init__(self, found: MaxProb, table: list[Fraction], transient: Flags) -> None:
         self.found, self.table = found, table
         self.space, self.graph = found.space, found.graph
-        self.states = np.flatnonzero(open_states)
-        self.open = open_states
+        self.states = np.flatnonzero(transient)
+        self.transient = transient
         self.number = np.full(self.graph.states, -1, dtype=np.int64)
         self.number[self.states] = np.arange(len(self.states))
-        self.allowed = found.best & open_states[self.graph.choice_state]
+        self.allowed = found.best & transient[self.graph.choice_state]
         self.weight = draw_probabilities(self.space)
         floats = np.array([rounded(cost) for cost in table])
         weights = self.weight * floats[self.space.edge_draw]
         self.cost = sums(self.graph.edge_choice, weights, self.graph.choices)
 
     def choice_values(self, values: Floats) -> Floats:
-        """Expected cost of each choice, given that of the states."""
-        weights = self.weight * values[self.space.edge_target]
+        """The Q-value of each choice, its expected cost, given that of the states."""
+        weights = self.weight * values[self.space.edge_successor]
         found: Floats = self.cost + sums(self.graph.edge_choice, weights, self.graph.choices)
         return found
 
@@ -99,13 +99,13 @@ class _System:
         own = policy[self.states]
         self._sweep(values, lambda found: found[own], limits)
         choices = np.flatnonzero(self.allowed)
-        # Choices are ordered by state, and every open state has an allowed one.
+        # Choices are ordered by state, and every transient state has an allowed one.
         first = np.searchsorted(self.graph.choice_state[choices], self.states)
         self._sweep(values, lambda found: np.minimum.reduceat(found[choices], first), limits)
         return values
 
     def _sweep(self, values: Floats, choose: Callable[[Floats], Floats], limits: Limits) -> None:
-        """Give every open state what ``choose`` makes of the values of the choices, until they rest."""
+        """Give every transient state what ``choose`` makes of the values of the choices, until they rest."""
         for step in range(_MOST_SWEEPS):
             after = choose(self.choice_values(values))
             moved = np.abs(after - values[self.states]).max()
@@ -123,8 +123,8 @@ class _System:
 
     def policy_from(self, values: Floats) -> Number:
         """A policy of such choices that ends: each state moves closer to an end."""
-        via = self.graph.reach(~self.open, self.ties(values)).via
-        return np.where(self.open & (via < 0), self.found.policy, np.where(self.open, via, -1))
+        via = self.graph.reach(~self.transient, self.ties(values)).via
+        return np.where(self.transient & (via < 0), self.found.policy, np.where(self.transient, via, -1))
 
     # --- rationals -------------------------------------------------------------------------------
 
@@ -132,13 +132,12 @@ class _System:
         cost = _ZERO
         row: dict[int, Fraction] = {}
         space = self.space
-        for edge in range(int(space.edge_first[choice]), int(space.edge_first[choice + 1])):
-            draw = int(space.edge_draw[edge])
+        for state, draw in space.outcomes(choice):
             p = space.draws[draw].probability
             cost += p * self.table[draw]
-            target = int(self.number[space.edge_target[edge]])
-            if target >= 0:
-                row[target] = row.get(target, _ZERO) + p
+            successor = int(self.number[state])
+            if successor >= 0:
+                row[successor] = row[successor] + p if successor in row else p
         return cost, row
 
     def exact(self, policy: Number, limits: Limits) -> list[Fraction] | None:
@@ -148,7 +147,7 @@ class _System:
         while True:
             limits.check_time("the search for the least cost")
             rows = [self.row(int(choice)) for choice in policy[self.states]]
-            values = solve([row for _, row in rows], [cost for cost, _ in rows], limits)
+            values = solved(rows, limits)
             if values is None:
                 return None
             floats = np.zeros(self.graph.states)
@@ -166,7 +165,7 @@ class _System:
 
     def exact_value(self, choice: int, values: list[Fraction]) -> Fraction:
         cost, row = self.row(choice)
-        return cost + sum((p * values[target] for target, p in row.items()), _ZERO)
+        return cost + sum((p * values[successor] for successor, p in row.items()), _ZERO)
 
     def ties_exactly(self, exact: list[Fraction], values: Floats) -> Flags:
         """Allowed choices that attain their state's cost."""

@@ -1,7 +1,8 @@
-"""The states that matter for a policy, and the choices open to it in each.
+"""Multi-policies (permissive strategies: Dräger et al. 2015): the states that matter for a policy, and all
+choices that are as good in each.
 
-Every way of taking the choices offered here reaches the goal with the best probability, and at the
-least expected cost where that is known; a tree may take whichever makes it smaller.
+Every way of taking them reaches the goal with the best probability, and at the least expected cost where that
+is known; a tree may take whichever makes it smaller.
 """
 
 from __future__ import annotations
@@ -14,48 +15,29 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.explore import StateSpace, ranges
-from bbtc.planner.mdp.graph import Number
-from bbtc.planner.mdp.maxprob import Reachability
+from bbtc.planner.mdp.maxprob import MaxProb
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.ssp import LeastCost, least_cost
+from bbtc.planner.mdp.state_space import Branching, Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
 
-MOST_OPEN = 20_000
+MOST_STATES = 20_000
 """More states than this, and one policy is fixed before a tree is made of it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Offers:
-    """A part of a space with local state numbers. State i has the offers ``first[i]:first[i + 1]``,
-    each an action (``action``) and the states it may lead to (``target`` from ``edge_first``).
-    States without offers end a run: in the goal (``goal``), because the goal is out of reach, or
-    because nothing can start there for want of attempts (``idle``)."""
+@dataclass(frozen=True, slots=True, eq=False)
+class MultiPolicy(Branching):
+    """For every state, choices that are equally good, over a part of a space with state numbers of its own.
+    ``values`` are the states, and ``initial`` those that runs start in. States without choices end a run: in
+    the goal, because the goal is out of reach, or because nothing can start there for want of attempts
+    (``idle``)."""
 
     values: npt.NDArray[np.uint8]
-    goal: Flags
     idle: Flags
-    first: Index
-    action: Index
-    edge_first: Index
-    target: Index
     initial: Index
 
-    def reached(self, taken: Flags) -> Flags:
-        """States that a run may visit if it takes only offers of ``taken``."""
-        found = np.zeros(len(self.goal), dtype=np.bool_)
-        frontier = np.unique(self.initial)
-        while len(frontier):
-            found[frontier] = True
-            offers = ranges(self.first[frontier], self.first[frontier + 1] - self.first[frontier])
-            offers = offers[taken[offers]]
-            edges = ranges(self.edge_first[offers], self.edge_first[offers + 1] - self.edge_first[offers])
-            targets = np.unique(self.target[edges])
-            frontier = targets[~found[targets]]
-        return found
 
-
-def best_offers(found: Reachability, limits: Limits) -> tuple[Offers, LeastCost | None]:
+def best_multi_policy(found: MaxProb, limits: Limits) -> tuple[MultiPolicy, LeastCost | None]:
     """The choices of the cheapest among the best policies; of one of them where they are too many,
     and of one of the best where costs are not known. Raises ``LimitReached`` when the time is over."""
     cheapest = least_cost(found, limits)
@@ -67,15 +49,15 @@ def best_offers(found: Reachability, limits: Limits) -> tuple[Offers, LeastCost 
             policy, best = _fewest_actions(narrowed, limits)
     else:
         policy, best = _fewest_actions(found, limits)
-    offers = offers_of(found.space, best)
-    if len(offers.goal) > MOST_OPEN:
+    offered = multi_policy(found.space, best)
+    if len(offered.goal) > MOST_STATES:
         only = np.zeros_like(best)
         only[policy[policy >= 0]] = True
-        offers = offers_of(found.space, only)
-    return offers, cheapest
+        offered = multi_policy(found.space, only)
+    return offered, cheapest
 
 
-def likely_offers(found: Reachability, most: int) -> Offers | None:
+def likely_policy(found: MaxProb, most: int) -> MultiPolicy | None:
     """The choices of one best policy in the states that its runs visit most probably, ``most`` of them,
     where there are more; None where there are not. Elsewhere a run ends."""
     space = found.space
@@ -90,19 +72,18 @@ def likely_offers(found: Reachability, most: int) -> Offers | None:
         chance[state] = -weight
         choice = int(found.policy[state])
         if choice >= 0 and not space.goal[state]:
-            for edge in range(int(space.edge_first[choice]), int(space.edge_first[choice + 1])):
-                target = int(space.edge_target[edge])
-                if target not in chance:
-                    heapq.heappush(heap, (weight * probability[int(space.edge_draw[edge])], target))
+            for successor, draw in space.outcomes(choice):
+                if successor not in chance:
+                    heapq.heappush(heap, (weight * probability[draw], successor))
     if not heap:
         return None
     only = np.zeros_like(found.best)
     choices = found.policy[np.array(sorted(chance), dtype=np.int64)]
     only[choices[choices >= 0]] = True
-    return offers_of(space, only)
+    return multi_policy(space, only)
 
 
-def _fewest_actions(found: Reachability, limits: Limits) -> tuple[Number, Flags]:
+def _fewest_actions(found: MaxProb, limits: Limits) -> tuple[Number, Flags]:
     shortest = least_cost(found, limits, [Fraction(1)] * len(found.space.draws))
     if shortest is not None and shortest.exact:
         return shortest.policy, shortest.best
@@ -111,51 +92,33 @@ def _fewest_actions(found: Reachability, limits: Limits) -> tuple[Number, Flags]
     return found.policy, only
 
 
-def offers_of(
+def multi_policy(
     space: StateSpace, taken: Flags, entry: Index | None = None, inside: Flags | None = None
-) -> Offers:
+) -> MultiPolicy:
     """The part of a space that a run may visit if it takes only choices of ``taken``, from the initial
     states or from ``entry``; where ``inside`` is given, nothing starts outside of it."""
-    number = np.full(len(space.states), -1, dtype=np.int64)
-    initial = np.unique([state for _, state in space.initial]) if entry is None else entry
+    start = space.start if entry is None else entry
     if inside is not None:
-        taken = taken & np.repeat(inside, np.diff(space.choice_first))
-    found: list[Index] = []
-    frontier: Index = initial.astype(np.int64)
-    count = 0
-    while len(frontier):
-        number[frontier] = count + np.arange(len(frontier))
-        count += len(frontier)
-        found.append(frontier)
-        choices = _taken(space, frontier, taken)
-        edges = ranges(space.edge_first[choices], space.edge_first[choices + 1] - space.edge_first[choices])
-        targets = np.unique(space.edge_target[edges]).astype(np.int64)
-        frontier = targets[number[targets] < 0]
-    states = np.concatenate(found)
-    choices = _taken(space, states, taken)
-    owner_counts = _counts(space, states, taken)
-    edge_counts = space.edge_first[choices + 1] - space.edge_first[choices]
-    edges = ranges(space.edge_first[choices], edge_counts)
-    return Offers(
-        values=space.packing.unpack(space.states[states]),
+        taken = taken & inside[space.choice_state]
+    states = space.closure(start, taken)
+    choices = space.choices_of(states)
+    choices = choices[taken[choices]]
+    edges = space.edges_of(choices)
+    number, choice_number = _numbers(states, len(space.goal)), _numbers(choices, len(taken))
+    return MultiPolicy(
         goal=space.goal[states],
+        choice_state=number[space.choice_state[choices]],
+        choice_action=space.choice_action[choices],
+        edge_choice=choice_number[space.edge_choice[edges]],
+        edge_successor=number[space.edge_successor[edges]],
+        values=space.packing.unpack(space.states[states]),
         idle=np.zeros(len(states), dtype=np.bool_) if inside is None else ~inside[states],
-        first=np.concatenate(([0], np.cumsum(owner_counts))),
-        action=space.choice_action[choices].astype(np.int64),
-        edge_first=np.concatenate(([0], np.cumsum(edge_counts))),
-        target=number[space.edge_target[edges]],
-        initial=number[initial],
+        initial=number[start].astype(np.int64),
     )
 
 
-def _taken(space: StateSpace, states: Index, taken: Flags) -> Index:
-    choices = ranges(space.choice_first[states], space.choice_first[states + 1] - space.choice_first[states])
-    kept: Index = choices[taken[choices]]
-    return kept
-
-
-def _counts(space: StateSpace, states: Index, taken: Flags) -> Index:
-    counts = space.choice_first[states + 1] - space.choice_first[states]
-    choices = ranges(space.choice_first[states], counts)
-    owners = np.repeat(np.arange(len(states)), counts)
-    return np.bincount(owners[taken[choices]], minlength=len(states)).astype(np.int64)
+def _numbers(chosen: Index, count: int) -> Number:
+    """For each of ``count``, its place among the chosen."""
+    number = np.full(count, -1, dtype=np.int32)
+    number[chosen] = np.arange(len(chosen), dtype=np.int32)
+    return number

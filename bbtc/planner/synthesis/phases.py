@@ -1,4 +1,4 @@
-"""Policies within a number of actions, as phases: in each, a state has offers that are optimal
+"""Policies for a finite horizon, as phases with a multi-policy each: its choices are optimal
 whatever number of actions is left there.
 
 A tree does not count its steps, but a retry node bounds how many actions start below it. Where one
@@ -14,20 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.explore import ranges
 from bbtc.planner.mdp.finite_horizon import Horizon, best_choices, cheapest_choices
 from bbtc.planner.mdp.graph import Graph
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.transitions import Index
-from bbtc.planner.synthesis.permissive import Offers, offers_of
+from bbtc.planner.synthesis.permissive import MultiPolicy, multi_policy
 
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """Up to ``steps`` actions by these offers."""
+    """Up to ``steps`` actions by this multi-policy."""
 
     steps: int
-    offers: Offers
+    policy: MultiPolicy
 
 
 def phases(horizon: Horizon, limits: Limits) -> list[Phase]:
@@ -43,11 +42,11 @@ def phases(horizon: Horizon, limits: Limits) -> list[Phase]:
 def _phases(horizon: Horizon, graph: Graph, best: list[Flags], limits: Limits) -> list[Phase]:
     space = horizon.space
     left = len(horizon.values) - 1
-    entry: Index = np.unique([state for _, state in space.initial]).astype(np.int64)
+    entry = space.start
     found: list[Phase] = []
     while left and len(entry):
         steps, offered, inside, leaving = _longest(horizon, graph, best[:left], entry, limits)
-        found.append(Phase(steps, offers_of(space, offered, entry, inside)))
+        found.append(Phase(steps, multi_policy(space, offered, entry, inside)))
         left -= steps
         entry = leaving
     return found
@@ -75,24 +74,14 @@ def _longest(
         chosen[fresh[graph.choice_state] & ~inside[graph.choice_state]] = True
         chosen &= best | ~fresh[graph.choice_state]
         # A state seen before must keep some choice, unless it is given up now: going on is harmless.
-        had = _with_choice(graph, offered)
-        given_up = ~_with_choice(graph, best)
+        had = space.having(offered)
+        given_up = ~space.having(best)
         chosen |= offered & given_up[graph.choice_state]
-        if (again & had & ~_with_choice(graph, chosen)).any():
+        if (again & had & ~space.having(chosen)).any():
             break
         # A state given up before, but not now, cannot be told from the one that was.
         offered, inside = chosen, inside | fresh
         steps += 1
-        choices = ranges(space.choice_first[entry], space.choice_first[entry + 1] - space.choice_first[entry])
-        choices = choices[offered[choices]]
-        edges = ranges(space.edge_first[choices], space.edge_first[choices + 1] - space.edge_first[choices])
-        targets = np.unique(space.edge_target[edges]).astype(np.int64)
-        entry = targets[~space.goal[targets]]
+        after = space.successors(entry, offered)
+        entry = after[~space.goal[after]]
     return max(1, steps), offered, inside, entry
-
-
-def _with_choice(graph: Graph, choices: Flags) -> Flags:
-    """States that have one of the choices."""
-    found = np.zeros(graph.states, dtype=np.bool_)
-    found[graph.choice_state[choices]] = True
-    return found

@@ -21,7 +21,7 @@ from bbtc.planner.mdp.maxprob import Bounds
 from bbtc.planner.mdp.solve import best_known, best_within
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress
-from bbtc.planner.synthesis.permissive import best_offers, likely_offers
+from bbtc.planner.synthesis.permissive import best_multi_policy, likely_policy
 from bbtc.planner.synthesis.phases import phases
 from bbtc.planner.synthesis.tree import in_phases, synthesize
 from bbtc.rewrite.retry import longest_run
@@ -64,12 +64,12 @@ class _Search:
         self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
         limits = self.limits.within(GRACE) if best.interrupted else self.limits
         for most in _DRAFTS:
-            draft = likely_offers(best.found, most)
+            draft = likely_policy(best.found, most)
             if draft is None:
                 break
             self._keep(synthesize(self.task, draft, limits), limits)
-        offers, _ = best_offers(best.found, limits)
-        self._keep(synthesize(self.task, offers, limits), limits)
+        policy, _ = best_multi_policy(best.found, limits)
+        self._keep(synthesize(self.task, policy, limits), limits)
         finish(self.best, limits, self.options)
 
     def _within(self, steps: int) -> None:
@@ -78,13 +78,13 @@ class _Search:
         parts = phases(horizon, self.limits)
         done = False
         if len(parts) == 1:
-            root = synthesize(self.task, parts[0].offers, self.limits)
+            root = synthesize(self.task, parts[0].policy, self.limits)
             longest = longest_run(explore(self.task, root, self.limits))
             if longest is not None and longest <= steps:
                 self._keep(root)
                 done = True
         if not done:
-            self._keep(in_phases(self.task, [(part.steps, part.offers) for part in parts], self.limits))
+            self._keep(in_phases(self.task, [(part.steps, part.policy) for part in parts], self.limits))
         simple = simplified(self.task, self.best.root, self.limits)
         self._keep(numbered(shrunk(self.task, simple, self.target, self.limits)))
 

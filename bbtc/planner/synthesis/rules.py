@@ -1,4 +1,4 @@
-"""From the states that matter to a short list of rules: "if these literals hold, do this action".
+"""From a multi-policy to a decision list, a short list of rules: "if these literals hold, do this action".
 
 Rules are tried in order. They are found greedily, the one that decides most states for its size
 first (separate and conquer: Fürnkranz 1999); after each, states that no run visits any more are
@@ -19,7 +19,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.transitions import Index
-from bbtc.planner.synthesis.permissive import Offers
+from bbtc.planner.synthesis.permissive import MultiPolicy
 
 
 class Test(IntEnum):
@@ -77,52 +77,53 @@ class Rule:
 
 
 class Learner:
-    """Finds rules for the offers of a policy."""
+    """Finds rules for a multi-policy."""
 
-    def __init__(self, task: Task, offers: Offers, limits: Limits) -> None:
-        self.task, self.offers, self.limits = task, offers, limits
-        self.literals = _literals(offers.values)
-        columns = [literal.holds(offers.values) for literal in self.literals]
-        self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(offers.goal), len(self.literals))
-        self.owner = np.repeat(np.arange(len(offers.goal)), np.diff(offers.first))
-        self.taken = np.ones(len(offers.action), dtype=np.bool_)
+    def __init__(self, task: Task, policy: MultiPolicy, limits: Limits) -> None:
+        self.task, self.policy, self.limits = task, policy, limits
+        self.literals = _literals(policy.values)
+        columns = [literal.holds(policy.values) for literal in self.literals]
+        self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(policy.goal), len(self.literals))
+        self.taken = np.ones(len(policy.choice_action), dtype=np.bool_)
         self._own: dict[int, npt.NDArray[np.float64]] = {}
 
     def relevant(self) -> Flags:
         """The states that runs may still visit."""
-        return self.offers.reached(self.taken)
+        found = np.zeros(len(self.policy.goal), dtype=np.bool_)
+        found[self.policy.closure(self.policy.initial, self.taken)] = True
+        return found
 
     def learn(self, group: Flags, avoid: Flags) -> list[Rule]:
-        """Rules that decide every state of ``group`` that has offers, and apply in none of
-        ``avoid`` (nor in a state of the group without offers). Offers that the rules do not take
+        """Rules that decide every state of ``group`` that has choices, and apply in none of
+        ``avoid`` (nor in a state of the group without choices). Choices that the rules do not take
         are dropped from :attr:`taken`."""
         rules: list[Rule] = []
-        decided = np.zeros(len(self.offers.goal), dtype=np.bool_)
-        active = np.diff(self.offers.first) > 0
+        decided = np.zeros(len(self.policy.goal), dtype=np.bool_)
+        active = self.policy.having()
         while True:
             self.limits.check_time("the search for a small tree")
             relevant = self.relevant()
             waiting = np.flatnonzero(relevant & group & active & ~decided)
             if not len(waiting):
                 return rules
-            against = np.flatnonzero(relevant & ~decided & ((group & ~active & ~self.offers.idle) | avoid))
+            against = np.flatnonzero(relevant & ~decided & ((group & ~active & ~self.policy.idle) | avoid))
             tests, action, covered = self._best_rule(waiting, against)
             rules.append(Rule(tests, action, np.concatenate([waiting, against])))
             decided[covered] = True
             ours = np.zeros(len(decided), dtype=np.bool_)
             ours[covered] = True
-            self.taken &= ~ours[self.owner] | (self.offers.action == action)
+            self.taken &= ~ours[self.policy.choice_state] | (self.policy.choice_action == action)
 
     def _best_rule(self, waiting: Index, against: Index) -> tuple[tuple[Literal, ...], int, Index]:
         """The rule that decides most of the waiting states for its size."""
-        in_waiting = np.zeros(len(self.offers.goal), dtype=np.bool_)
+        in_waiting = np.zeros(len(self.policy.goal), dtype=np.bool_)
         in_waiting[waiting] = True
-        offers = np.flatnonzero(self.taken & in_waiting[self.owner])
-        actions = np.unique(self.offers.action[offers])
+        choices = np.flatnonzero(self.taken & in_waiting[self.policy.choice_state])
+        actions = np.unique(self.policy.choice_action[choices])
         best: tuple[tuple[float, int], tuple[int, ...], int, Index] | None = None
         for action in actions.tolist():
-            able = np.zeros(len(self.offers.goal), dtype=np.bool_)
-            able[self.owner[offers[self.offers.action[offers] == action]]] = True
+            able = np.zeros(len(self.policy.goal), dtype=np.bool_)
+            able[self.policy.choice_state[choices[self.policy.choice_action[choices] == action]]] = True
             wanted, others = waiting[able[waiting]], np.concatenate([waiting[~able[waiting]], against])
             # At best it decides all of them: with one test, or without any if there is nothing to tell apart.
             at_best = (-len(wanted) / 3, 1) if len(others) else (-float(len(wanted)), 0)

@@ -1,9 +1,19 @@
-"""From rules to a readable tree: ``Fallback(goal, Sequence(tests…, action), …)``.
+"""From a multi-policy to a readable tree, by way of rules (:mod:`bbtc.planner.synthesis.rules`).
 
-Where the goal can be unknown, its rules stand under a Skipper: ``Fallback(Skipper(goal, rules for
-unknown), rules for false…)``. Neighbouring rules for one action share its node, and neighbours that
-share a test stand under it together, where that saves nodes. Actions are not latched: a rule that
-applies again tries again.
+Rewrite rules, where "tests: action" is a rule of a policy:
+
+1. Rules ``r, …`` for states where the goal is false become ``Fallback(goal, r, …)``.
+2. Rules ``q, …`` for states where it is unknown put ``Skipper(goal, Fallback(q, …))`` in the goal's place.
+3. The goal ``a and b`` becomes ``Sequence(a, b)`` where neither is ever unknown: an unknown part would hide a
+   false one behind it.
+4. ``x, y: act`` becomes ``Sequence(x, y, act)``, the tests in an order in which none is ever unknown.
+5. Where there is no such order, ``known(x)`` comes before ``x``.
+6. Neighbours ``x: act``, ``y: act`` become ``Sequence(Fallback(x, y), act)``.
+7. Neighbours ``x, y: act``, ``x: do`` become ``Sequence(x, Fallback(Sequence(y, act), do))``, and the like
+   for more of them, where that saves nodes and x is never unknown.
+8. Policies that follow one another after m, n, … actions become ``Fallback(Retry(m, …), Retry(n, …), …)``.
+
+Actions are not latched: a rule that applies again tries again.
 """
 
 from __future__ import annotations
@@ -20,7 +30,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.transitions import Index
-from bbtc.planner.synthesis.permissive import Offers
+from bbtc.planner.synthesis.permissive import MultiPolicy
 from bbtc.planner.synthesis.rules import Learner, Literal, Rule, Test
 from bbtc.rewrite.simplify import numbered
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, walk
@@ -30,41 +40,41 @@ _MOST_LOOKS = 5_000
 tried, and what is left and right of it and in it, which takes exponential time where little is shared."""
 
 
-def synthesize(task: Task, offers: Offers, limits: Limits) -> Node:
-    """A tree that takes one of the offers in every state a run visits, and otherwise fails.
+def synthesize(task: Task, policy: MultiPolicy, limits: Limits) -> Node:
+    """A tree that takes one of the policy's choices in every state a run visits, and otherwise fails.
     Raises ``LimitReached`` when the time is over."""
-    return numbered(_tree(task, offers, limits, fall_through=False))
+    return numbered(_tree(task, policy, limits, fall_through=False))
 
 
-def in_phases(task: Task, phases: Sequence[tuple[int, Offers]], limits: Limits) -> Node:
-    """Trees for offers that follow one another, each after so many actions of the one before.
+def in_phases(task: Task, phases: Sequence[tuple[int, MultiPolicy]], limits: Limits) -> Node:
+    """Trees for multi-policies that follow one another, each after so many actions of the one before.
     Raises ``LimitReached`` when the time is over."""
     parts: list[Node] = []
-    for number, (steps, offers) in enumerate(phases, 1):
-        tree = _tree(task, offers, limits, fall_through=number < len(phases))
-        parts.append(ControlNode("", "retry", (tree,), attempts=steps))
+    for number, (steps, policy) in enumerate(phases, 1):
+        tree = _tree(task, policy, limits, fall_through=number < len(phases))
+        parts.append(ControlNode("", "retry", (tree,), attempts=steps))  # rule 8
     return numbered(_control("fallback", parts) if parts else ConditionNode("", task.goal))
 
 
-def _tree(task: Task, offers: Offers, limits: Limits, *, fall_through: bool) -> Node:
+def _tree(task: Task, policy: MultiPolicy, limits: Limits, *, fall_through: bool) -> Node:
     """``fall_through``: fail where the goal is unknown and nothing is done about it, so that what
     follows gets its turn."""
-    goal = _truths(task.goal, offers.values)
+    goal = _truths(task.goal, policy.values)
     unknown: Flags = goal == Truth.UNKNOWN
     false: Flags = goal == Truth.FALSE
     nowhere = np.zeros_like(unknown)
-    learner = Learner(task, offers, limits)
-    ending = np.diff(offers.first) == 0
+    learner = Learner(task, policy, limits)
+    ending = ~policy.having()
     watching = learner.learn(unknown, nowhere)
     acting = learner.learn(false, unknown & ending)
-    node = _goal_node(task, offers.values[learner.relevant()])
-    build = _Builder(task, offers.values, limits)
-    if watching:
+    node = _goal_node(task, policy.values[learner.relevant()])
+    build = _Builder(task, policy.values, limits)
+    if watching:  # rule 2
         node = _control("skipper", [node, build.choice(build.rules(watching))])
     elif fall_through and (unknown & learner.relevant()).any():
         node = _control("skipper", [node, ConditionNode("", FALSE)])
     children = build.rules(acting)
-    return _control("fallback", [node, *children]) if children else node
+    return _control("fallback", [node, *children]) if children else node  # rule 1
 
 
 def _truths(condition: Condition, values: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
@@ -78,7 +88,7 @@ def _goal_node(task: Task, values: npt.NDArray[np.uint8]) -> Node:
     parts = conjuncts(task.goal)
     if len(parts) < 2 or any((_truths(part, values) == Truth.UNKNOWN).any() for part in parts):
         return ConditionNode("", task.goal)
-    return _control("sequence", [ConditionNode("", part) for part in parts])
+    return _control("sequence", [ConditionNode("", part) for part in parts])  # rule 3
 
 
 def _control(kind: ControlKind, children: Sequence[Node]) -> Node:
@@ -105,6 +115,7 @@ class _Builder:
         self.limits.check_time("the search for a small tree")
         self.left -= len(rules)
         best = self._flat(rules)
+        # Rule 7.
         for literal, start, end in self._shared(rules):
             inner = [replace(r, tests=tuple(t for t in r.tests if t != literal)) for r in rules[start:end]]
             if not self._settled([literal], rules[start].asked):
@@ -146,7 +157,7 @@ class _Builder:
             while position + len(alike) < len(rules) and rules[position + len(alike)].action == rule.action:
                 alike.append(rules[position + len(alike)])
             action = ActionNode("", self.task.actions[rule.action].name, latched=False)
-            if all(each.tests for each in alike) and len(alike) > 1:
+            if all(each.tests for each in alike) and len(alike) > 1:  # rule 6
                 tests = [_control("sequence", self._conditions(each)) for each in alike]
                 nodes.append(_control("sequence", [self.choice(tests), action]))
             else:
@@ -155,14 +166,13 @@ class _Builder:
         return nodes
 
     def _conditions(self, rule: Rule) -> list[Node]:
-        """The tests of a rule, in an order in which none is ever unknown; where there is no such
-        order, ``known`` tests come before."""
+        """The tests of a rule: rule 4."""
         waiting = list(rule.tests)
         asked = rule.asked
         nodes: list[Node] = []
         while waiting:
             literal = next((t for t in waiting if self._settled([t], asked)), None)
-            if literal is None:
+            if literal is None:  # rule 5
                 literal = Literal(waiting[0].variable, Test.KNOWN)
             else:
                 waiting.remove(literal)

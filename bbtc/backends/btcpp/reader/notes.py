@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any, get_args
 
 from bbtc.artefacts.conditions import condition_from_json
-from bbtc.artefacts.cursor import At, Fault
+from bbtc.artefacts.cursor import At
 from bbtc.artefacts.numbers import parse_number
 from bbtc.backends.btcpp.names import shown, without_number
 from bbtc.backends.btcpp.notes import KIND, MARK, VERSION, kind_of, template_label
@@ -18,12 +18,13 @@ from bbtc.backends.btcpp.reader.leaves import FileNames
 from bbtc.backends.btcpp.reader.xmltext import XmlDocument
 from bbtc.backends.names import Kind, Symbol
 from bbtc.backends.shape import written
+from bbtc.diagnostics import Unreadable
 from bbtc.ground.condition import TRUE
 from bbtc.ground.task import Task
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Status, Tree, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, PlanStatus, Tree, walk
 
 _KINDS: Mapping[str, Kind] = {"predicate": "predicate", "action": "action"}
-_STATUSES: Mapping[str, Status] = {status: status for status in get_args(Status)}
+_STATUSES: Mapping[str, PlanStatus] = {status: status for status in get_args(PlanStatus)}
 _NUMBERED_ID = re.compile(r"n([0-9]{1,9})")
 
 
@@ -35,7 +36,7 @@ class Notes:
     problem: str | None = None
     success_probability: Fraction | None = None
     target: Fraction | None = None
-    status: Status = "stuck"
+    status: PlanStatus = "stuck"
     bounds: tuple[Fraction, Fraction] | None = None
     names: FileNames = field(default_factory=lambda: FileNames("", {}, {}))
     kinds: tuple[str, ...] = ()
@@ -51,7 +52,7 @@ def read_notes(document: XmlDocument, namespace: str) -> Notes | None:
         return Notes(names=FileNames(namespace, {}, {}))
     try:
         return _notes(json.loads(texts[-1][len(MARK) :]), namespace)
-    except (ValueError, TypeError, KeyError, RecursionError, Fault):
+    except (ValueError, TypeError, KeyError, RecursionError, Unreadable):
         return None
 
 
@@ -138,7 +139,7 @@ def _exact(task: Task, node: Node, note: Mapping[str, object]) -> Node:
     if isinstance(node, ConditionNode) and "condition" in note:
         try:
             condition = condition_from_json(At(note["condition"]), task.variable_index)
-        except Fault:
+        except Unreadable:
             return node
         if written(task, condition) == node.condition:
             node = replace(node, condition=condition)

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.reader.patterns import Match, is_long, tag_of
 from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
-from bbtc.diagnostics import Diagnostic
+from bbtc.diagnostics import Diagnostic, Unreadable
 
 _SHOWN = MappingProxyType(
     {
@@ -38,14 +38,6 @@ WITHOUT_MEANING: Mapping[str, Mapping[str, str]] = MappingProxyType(
     }
 )
 """The attributes that say nothing of what a tree does, by where they stand, and what they are."""
-
-
-class Unreadable(Exception):
-    """What a tree cannot hold, and its place."""
-
-    def __init__(self, diagnostic: Diagnostic) -> None:
-        self.diagnostic = diagnostic
-        super().__init__(diagnostic.message)
 
 
 def unreadable(

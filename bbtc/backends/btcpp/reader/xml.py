@@ -8,7 +8,7 @@ its place. What a tree cannot hold is reported with its place. The inverse of
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import islice
@@ -35,18 +35,18 @@ from bbtc.backends.btcpp.reader.patterns import (
     match,
     tag_of,
 )
-from bbtc.backends.btcpp.reader.unread import Unread, Unreadable, unreadable
+from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.reader.xmltext import XmlElement, parse_xml
 from bbtc.backends.interface import guard_of
 from bbtc.backends.shape import words_of, written
-from bbtc.diagnostics import BbtcError, Diagnostic, Report, Severity
+from bbtc.diagnostics import BbtcError, Diagnostic, Report, Unreadable
 from bbtc.ground.condition import TRUE, And, Condition, Or
 from bbtc.ground.task import Task, ground_name
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 from bbtc.tree.deep import Deep, unwind
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree, walk
-from bbtc.tree.validate import MAX_DEPTH, ChildPath, tree_problems
+from bbtc.tree.validate import MAX_DEPTH, tree_problems
 
 _MOST_FAULTS = 50
 _MOST_READ = 30  # elements of a file for each node that a tree may have
@@ -108,7 +108,7 @@ def tree_from_btcpp(
     notes = read_notes(document, namespace)
     if notes is None:
         message = "the notes at the end of the file cannot be read: ids and claims are made anew"
-        report.add(Diagnostic("BBT0617", message, document.span(document.root), None, Severity.WARNING))
+        report.add(Diagnostic("BBT0617", message, document.span(document.root)))
         notes = read_notes(replace(document, comments=()), namespace) or Notes()
     if notes.problem is not None and (notes.domain, notes.problem) != (task.domain, task.problem):
         about = clip(f"{notes.domain}/{notes.problem}")
@@ -129,8 +129,8 @@ def tree_from_btcpp(
     tree = with_notes(tree, notes)
     limits.check_nodes(sum(1 for _ in walk(root)))
     problems = [
-        Diagnostic(p.code, p.message, document.span(reader.place(root, p.path)), p.hint)
-        for p in islice(tree_problems(tree), _MOST_FAULTS)
+        replace(each, span=document.span(reader.place(root, each.path)), path=())
+        for each in islice(tree_problems(tree), _MOST_FAULTS)
     ]
     if problems:
         raise BbtcError(problems)
@@ -198,18 +198,19 @@ class _Reader:
             listed = clip(", ".join(spare))
             place = self._document.span(self._layout.trees[spare[0]], "ID")
             message = f"not part of the tree, as '{clip(self._layout.main)}' does not call it: {listed}"
-            yield Diagnostic("BBT0618", message, place, "give --tree ID for another", Severity.NOTE)
+            yield Diagnostic("BBT0618", message, place, "give --tree ID for another")
         if self._flag is None:
             message = "where nothing can go on, the tree fails, but the file is RUNNING for ever"
             hint = "export the tree anew: its branch 'until blocked' is missing in the file"
             place = self._document.span(self._layout.trees[self._layout.main])
-            yield Diagnostic("BBT0620", message, place, hint, Severity.WARNING)
+            yield Diagnostic("BBT0620", message, place, hint)
 
-    def place(self, root: Node, path: ChildPath) -> XmlElement:
+    def place(self, root: Node, path: Sequence[str | int]) -> XmlElement:
         """The element that a node was read from."""
         node = root
         for number in path:
             assert isinstance(node, ControlNode)
+            assert isinstance(number, int)
             node = node.children[number]
         return self.places[id(node)]
 

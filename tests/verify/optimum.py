@@ -26,7 +26,7 @@ def best_probability(space: Space, limits: Limits, label: str = "goal") -> Fract
         for state, possible in enumerate(choices):
             best = values[state]
             for steps in possible if state not in goal else ():
-                value = sum((step.probability * values[step.target] for step in steps), _ZERO)
+                value = sum((step.probability * values[step.successor] for step in steps), _ZERO)
                 if value > best:
                     best, policy[state], improved = value, steps, True
         if not improved:
@@ -42,12 +42,12 @@ def _first_policy(
         for steps in possible:
             for step in steps:
                 if step.probability:
-                    into[step.target].append((state, steps))
+                    into[step.successor].append((state, steps))
     policy: list[tuple[Step, ...] | None] = [None] * len(choices)
     found = sorted(goal)
     seen = set(found)
-    for target in found:  # grows while it is read: breadth first
-        for state, steps in into[target]:
+    for successor in found:  # grows while it is read: breadth first
+        for state, steps in into[successor]:
             if state not in seen:
                 seen.add(state)
                 policy[state] = steps
