@@ -64,8 +64,11 @@ class Root(Generic[F]):
 
 
 def every(needs: Iterable[Need[F] | None]) -> Need[F] | None:
-    """What is needed together; None (nothing) where each part is None."""
+    """What is needed together; None (nothing) where each part is None, and no more than a part without an
+    alternative, if there is one: all the rest would not help."""
     found = [need for need in needs if need is not None]
+    if Some(()) in found:
+        return Some(())
     return None if not found else found[0] if len(found) == 1 else Every(tuple(found))
 
 
