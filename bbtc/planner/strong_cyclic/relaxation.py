@@ -1,0 +1,286 @@
+"""The delete relaxation of a determinised task: how far the goal is, what helps, what is a dead end.
+
+Costs are those of the additive heuristic, from which a relaxed plan is read off (Hoffmann, Nebel, "The FF planning
+system", 2001; Keyder, Geffner, "Heuristics for planning with action costs revisited", 2008). A variable takes
+a value, unknown among them, as a fact of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from heapq import heappop, heappush
+
+from bbtc.limits import Limits
+from bbtc.planner.mdp.packing import ALWAYS, BitTest, cubes, set_bits
+from bbtc.planner.strong_cyclic.determinised import Determinised
+from bbtc.planner.strong_cyclic.exclusion import Exclusion
+from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, literals, united, without
+
+_NEVER = 1 << 60
+_MOST_CUBES = 32  # disjuncts of one condition; with more, it counts as true
+_OPERATORS_AT_ONCE = 1024  # between two looks at the limits
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """``steps`` of a relaxed plan, and the actions of it that may start at once."""
+
+    steps: int
+    helpful: tuple[int, ...]
+
+
+class Relaxation:
+    """The relaxation, indexed once and asked for many states. Facts are numbered: variable v is false (4 v),
+    unknown, true, or known; then the goal, and what always holds."""
+
+    def __init__(self, model: Determinised, exclusion: Exclusion, limits: Limits) -> None:
+        self.model, self.exclusion, self.limits = model, exclusion, limits
+        self.packing = model.packing
+        self.count = 4 * len(self.packing.unknown) + 2
+        self.goal = self.count - 2
+        self._always = self.count - 1
+        self.never: set[int] = set()
+        """Actions that must not start anywhere."""
+        self.demands: dict[int, PartialState] = {}
+        """What actions need beyond their preconditions."""
+        self._build()
+
+    # --- operators ------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        self._action: list[int] = []
+        self._needs: list[tuple[int, ...]] = []
+        self._adds: list[tuple[int, ...]] = []
+        known = {3 + 4 * v for v, at in enumerate(self.packing.unknown) if at is not None}
+        made: dict[tuple[tuple[int, ...], tuple[int, ...], int], None] = {}
+        for needs in self._facts_of(self.model.goal, ANY_STATE):
+            made[needs, (self.goal,), -1] = None
+        for action in self.model.actions:
+            if action.number % _OPERATORS_AT_ONCE == 0:
+                self.limits.check_time("planning")
+            if action.number in self.never:
+                continue
+            demand = self.demands.get(action.number, ANY_STATE)
+            disjuncts = (ANY_STATE,) if action.needs is None else action.needs
+            for need in disjuncts:
+                for step in action.steps:
+                    for when, sets in [(part.when, part.sets) for part in step.guarded] or [
+                        (ALWAYS, step.sets)
+                    ]:
+                        adds = tuple(self._added(sets, known))
+                        for needs in self._facts_of(when, united(need, demand)):
+                            made[needs, adds, action.number] = None
+        wanted = {fact for needs, _, _ in made for fact in needs} | {self.goal}
+        for needs, adds, number in made:
+            useful = tuple(fact for fact in adds if fact in wanted and fact not in needs)
+            if useful:
+                self._needs.append(needs)
+                self._adds.append(useful)
+                self._action.append(number)
+        self._users: list[list[int]] = [[] for _ in range(self.count)]
+        for operator, needs in enumerate(self._needs):
+            for fact in needs:
+                self._users[fact].append(operator)
+        self._counts = [len(needs) for needs in self._needs]
+        self._operators: dict[int, list[int]] = {}
+        for operator, number in enumerate(self._action):
+            self._operators.setdefault(number, []).append(operator)
+        self._stale = False
+        self._is_wanted = bytearray(self.count)
+        self._masks = [0, 0, 0, 0]
+        for fact in sorted(wanted):
+            self._is_wanted[fact] = 1
+            if fact < self.goal:
+                self._masks[fact % 4] |= 1 << fact // 4
+
+    def _facts_of(self, test: BitTest, also: PartialState) -> Iterator[tuple[int, ...]]:
+        found = cubes(test, _MOST_CUBES)
+        for cube in [ANY_STATE] if found is None else found:
+            if not (cube.value ^ also.value) & cube.mask & also.mask:
+                yield tuple(self._facts(united(cube, also))) or (self._always,)
+
+    def _facts(self, partial: PartialState) -> Iterator[int]:
+        for literal in literals(self.packing, partial):
+            variable = self.packing.owner((literal.mask & -literal.mask).bit_length() - 1)
+            unknown = self.packing.unknown[variable]
+            if literal.mask >> variable & 1:
+                yield 4 * variable + (2 if literal.value >> variable & 1 else 0)
+            else:
+                assert unknown is not None
+                yield 4 * variable + (1 if literal.value >> unknown & 1 else 3)
+
+    @staticmethod
+    def _added(sets: Iterable[tuple[int, int]], known: set[int]) -> Iterator[int]:
+        for variable, value in sets:
+            yield 4 * variable + int(value)
+            if value != 1 and 4 * variable + 3 in known:
+                yield 4 * variable + 3
+
+    def forbid(self, action: int) -> None:
+        """The action must not start anywhere."""
+        self.never.add(action)
+        for operator in self._operators.pop(action, ()):
+            self._counts[operator] += 1  # which nothing counts down
+
+    def demand(self, action: int, partial: PartialState) -> None:
+        """The action needs more than its precondition says."""
+        self.demands[action] = united(self.demands.get(action, ANY_STATE), partial)
+        for fact in self._facts(partial):
+            if not self._is_wanted[fact]:
+                self._stale = True
+                return
+            for operator in self._operators.get(action, ()):
+                if fact not in self._needs[operator]:
+                    self._needs[operator] = (*self._needs[operator], fact)
+                    self._users[fact].append(operator)
+                    self._counts[operator] += 1
+
+    def holding(self, state: int) -> list[int]:
+        """The facts of a state that matter."""
+        count = len(self.packing.unknown)
+        unknown = 0
+        for variable, at in enumerate(self.packing.unknown):
+            if at is not None and state >> at & 1:
+                unknown |= 1 << variable
+        everything = (1 << count) - 1
+        true = state & everything & ~unknown
+        false = everything & ~true & ~unknown
+        found = [4 * variable + 2 for variable in set_bits(true & self._masks[2])]
+        found.extend(4 * variable for variable in set_bits(false & self._masks[0]))
+        found.extend(4 * variable + 1 for variable in set_bits(unknown & self._masks[1]))
+        found.extend(4 * variable + 3 for variable in set_bits(~unknown & everything & self._masks[3]))
+        return found
+
+    # --- the heuristic ----------------------------------------------------------------------------
+
+    def estimate(self, state: int) -> Estimate | None:
+        """A guess of the steps to the goal; None if it is out of reach, even in the relaxation."""
+        if self._stale:
+            self._build()
+        cost = [_NEVER] * self.count
+        by = [-1] * self.count
+        left = self._counts.copy()
+        total = [0] * len(left)
+        queue: list[int] = []
+        size = self.count
+        holding = [*self.holding(state), self._always]
+        for fact in holding:
+            cost[fact] = 0
+            queue.append(fact)
+        users, adds, actions, goal = self._users, self._adds, self._action, self.goal
+        while queue:
+            entry = heappop(queue)
+            spent, fact = divmod(entry, size)
+            if spent > cost[fact]:
+                continue
+            if fact == goal:
+                return self._relaxed_plan(by, cost)
+            for operator in users[fact]:
+                left[operator] -= 1
+                total[operator] += spent
+                if not left[operator]:
+                    price = total[operator] + (actions[operator] >= 0)
+                    for added in adds[operator]:
+                        if price < cost[added]:
+                            cost[added] = price
+                            by[added] = operator
+                            heappush(queue, price * size + added)
+        return None
+
+    def _relaxed_plan(self, by: list[int], cost: list[int]) -> Estimate:
+        chosen: set[tuple[int, tuple[int, ...]]] = set()
+        helpful: set[int] = set()
+        seen = {self.goal}
+        stack = [self.goal]
+        while stack:
+            operator = by[stack.pop()]
+            if operator < 0:
+                continue
+            needs = self._needs[operator]
+            action = self._action[operator]
+            if action >= 0:
+                chosen.add((action, needs))
+                if all(cost[fact] == 0 for fact in needs):
+                    helpful.add(action)
+            for fact in needs:
+                if fact not in seen:
+                    seen.add(fact)
+                    stack.append(fact)
+        return Estimate(len(chosen), tuple(sorted(helpful)))
+
+    # --- dead ends ----------------------------------------------------------------------------------
+
+    def generalised(self, state: int) -> PartialState:
+        """Enough for the goal to be out of reach in the relaxation, of a state where it is: no literal of it
+        can be left out."""
+        if self._stale:
+            self._build()
+        reach = _Reach(self._users, self._adds, self._counts, self.goal)
+        assert reach.add([*self.holding(state), self._always])
+        everything = (1 << self.packing.words * 64) - 1
+        full = 0
+        for variable in range(len(self.packing.unknown)):
+            full |= self.packing.bits(variable)
+        kept = self.exclusion.shortest(PartialState(full & everything, state))
+        order = literals(self.packing, kept)
+        order.sort(key=lambda literal: literal.value != 0)
+        for literal in order:
+            rest = without(kept, literal.mask)
+            implied = self.exclusion.implied(rest)
+            if literal.mask & implied:  # another literal says so
+                kept = rest
+                continue
+            freed = literal.mask
+            if literal.value:
+                freed |= self.exclusion.implied(literal) & ~implied & ~rest.mask
+            if reach.add(self._other_facts(freed, state)):
+                kept = rest
+        return kept
+
+    def _other_facts(self, bits: int, state: int) -> list[int]:
+        """All values that the variables of some bits may have besides those in the state."""
+        found: list[int] = []
+        for variable in sorted({self.packing.owner(bit) for bit in set_bits(bits)}):
+            values = (0, 2) if self.packing.unknown[variable] is None else (0, 1, 2, 3)
+            found.extend(4 * variable + value for value in values)
+        return found
+
+
+class _Reach:
+    """What is reached in the relaxation, growing as long as the goal is not."""
+
+    def __init__(
+        self, users: list[list[int]], adds: list[tuple[int, ...]], counts: list[int], goal: int
+    ) -> None:
+        self.users, self.adds, self.goal = users, adds, goal
+        self.left = counts.copy()
+        self.reached = bytearray(len(users))
+
+    def add(self, facts: Iterable[int]) -> bool:
+        """Add facts and what follows; unless the goal would be reached: then nothing changes."""
+        new: list[int] = []
+        for fact in facts:
+            if not self.reached[fact]:
+                self.reached[fact] = 1
+                new.append(fact)
+        used = 0
+        for fact in new:  # grows while it is read
+            if fact == self.goal:
+                break
+            used += 1
+            for operator in self.users[fact]:
+                self.left[operator] -= 1
+                if not self.left[operator]:
+                    for added in self.adds[operator]:
+                        if not self.reached[added]:
+                            self.reached[added] = 1
+                            new.append(added)
+        if used == len(new):
+            return True
+        for fact in new[:used]:
+            for operator in self.users[fact]:
+                self.left[operator] += 1
+        for fact in new:
+            self.reached[fact] = 0
+        return False
