@@ -16,6 +16,7 @@ STRATEGIES = {
     "refine": ("bbtc.planner.chaining.refine", "refine"),
     "search": ("bbtc.planner.chaining.search", "plan_search"),
     "policy": ("bbtc.planner.synthesis.policy", "plan_policy"),
+    "strong-cyclic": ("bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic"),
     "auto": ("bbtc.planner.auto", "plan_auto"),
     "advised": ("bbtc.planner.auto", "plan_advised"),
 }
@@ -30,7 +31,7 @@ def require_strategy(name: str, options: Options) -> None:
         raise BbtcError.single(
             "BBT0501", f"unknown strategy '{name}'", hint=f"known: {', '.join(STRATEGIES)}"
         )
-    if name in {"refine", "search"} and options.max_actions is not None:
+    if name in {"refine", "search", "strong-cyclic"} and options.max_actions is not None:
         raise BbtcError.single(
             "BBT0503",
             f"the strategy '{name}' does not plan within a number of actions",

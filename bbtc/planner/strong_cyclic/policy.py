@@ -127,7 +127,11 @@ class Covers:
         self._index.add(len(self.partials), partial)
         self.partials.append(partial)
 
+    def number(self, state: int) -> int | None:
+        """The number of the first of them that a state satisfies."""
+        return min(self._index.satisfied(state), default=None)
+
     def first(self, state: int) -> PartialState | None:
         """The first of them that a state satisfies."""
-        found = self._index.satisfied(state)
-        return self.partials[min(found)] if found else None
+        found = self.number(state)
+        return None if found is None else self.partials[found]
