@@ -97,21 +97,7 @@ class DeadEnds:
         before = self.exclusion.shortest(before)
         if not self.forbidden.add(before, action.number):
             return
-        if not before.mask:
-            self.relaxation.forbid(action.number)
-            return
-        opposite = self._opposite(before)
-        if opposite is not None:
-            self.relaxation.demand(action.number, opposite)
-
-    def _opposite(self, partial: PartialState) -> PartialState | None:
-        """Where it does not hold, if that is a partial state."""
-        if partial.mask.bit_count() == 1:
-            variable = self.model.packing.owner(partial.mask.bit_length() - 1)
-            two_valued = self.model.packing.unknown[variable] is None
-            if two_valued or not partial.mask >> variable & 1:
-                return PartialState(partial.mask, partial.mask & ~partial.value)
-        return None
+        self.relaxation.forbid(action.number, before)
 
     def _generalised(self, exhausted: Exhausted) -> dict[int, PartialState]:
         """For states of an exhausted search, enough for the search to find nothing."""

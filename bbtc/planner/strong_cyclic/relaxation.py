@@ -19,6 +19,10 @@ from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, li
 
 _NEVER = 1 << 60
 _MOST_CUBES = 32  # disjuncts of one condition; with more, it counts as true
+_MOST_WAYS = 64  # ways not to be where an action is forbidden; with more, it counts as allowed
+_FEW_EXCLUDED = 2
+_OPPOSITE_OF_TWO = {0: (2,), 2: (0,)}
+_OPPOSITE_OF_THREE = {0: (1, 2), 1: (3,), 2: (0, 1), 3: (1,)}
 _OPERATORS_AT_ONCE = 1024  # between two looks at the limits
 
 
@@ -40,10 +44,6 @@ class Relaxation:
         self.count = 4 * len(self.packing.unknown) + 2
         self.goal = self.count - 2
         self._always = self.count - 1
-        self.never: set[int] = set()
-        """Actions that must not start anywhere."""
-        self.demands: dict[int, PartialState] = {}
-        """What actions need beyond their preconditions."""
         self._build()
 
     # --- operators ------------------------------------------------------------------------------
@@ -59,9 +59,6 @@ class Relaxation:
         for action in self.model.actions:
             if action.number % _OPERATORS_AT_ONCE == 0:
                 self.limits.check_time("planning")
-            if action.number in self.never:
-                continue
-            demand = self.demands.get(action.number, ANY_STATE)
             disjuncts = (ANY_STATE,) if action.needs is None else action.needs
             for need in disjuncts:
                 for step in action.steps:
@@ -69,30 +66,43 @@ class Relaxation:
                         (ALWAYS, step.sets)
                     ]:
                         adds = tuple(self._added(sets, known))
-                        for needs in self._facts_of(when, united(need, demand)):
+                        for needs in self._facts_of(when, need):
                             made[needs, adds, action.number] = None
-        wanted = {fact for needs, _, _ in made for fact in needs} | {self.goal}
-        for needs, adds, number in made:
-            useful = tuple(fact for fact in adds if fact in wanted and fact not in needs)
-            if useful:
-                self._needs.append(needs)
-                self._adds.append(useful)
-                self._action.append(number)
         self._users: list[list[int]] = [[] for _ in range(self.count)]
-        for operator, needs in enumerate(self._needs):
-            for fact in needs:
-                self._users[fact].append(operator)
-        self._counts = [len(needs) for needs in self._needs]
+        self._counts: list[int] = []
         self._operators: dict[int, list[int]] = {}
-        for operator, number in enumerate(self._action):
-            self._operators.setdefault(number, []).append(operator)
-        self._stale = False
-        self._is_wanted = bytearray(self.count)
+        self._unwanted: dict[int, list[int]] = {}
+        self._wanted = bytearray(self.count)
         self._masks = [0, 0, 0, 0]
-        for fact in sorted(wanted):
-            self._is_wanted[fact] = 1
-            if fact < self.goal:
-                self._masks[fact % 4] |= 1 << fact // 4
+        self._choices: dict[tuple[int, ...], int] = {}
+        for needs, adds, number in made:
+            self._operate(needs, adds, number)
+        self._want(self.goal)
+
+    def _operate(self, needs: tuple[int, ...], adds: tuple[int, ...], action: int) -> None:
+        """One more operator; what it adds counts where something needs it."""
+        operator = len(self._needs)
+        self._needs.append(needs)
+        self._counts.append(len(needs))
+        self._action.append(action)
+        self._operators.setdefault(action, []).append(operator)
+        self._adds.append(tuple(fact for fact in adds if self._wanted[fact]))
+        for fact in adds:
+            if not self._wanted[fact]:
+                self._unwanted.setdefault(fact, []).append(operator)
+        for fact in needs:
+            self._users[fact].append(operator)
+            self._want(fact)
+
+    def _want(self, fact: int) -> None:
+        """From now on a fact matters."""
+        if self._wanted[fact]:
+            return
+        self._wanted[fact] = 1
+        if fact < self.goal:
+            self._masks[fact % 4] |= 1 << fact // 4
+        for operator in self._unwanted.pop(fact, ()):
+            self._adds[operator] = (*self._adds[operator], fact)
 
     def _facts_of(self, test: BitTest, also: PartialState) -> Iterator[tuple[int, ...]]:
         found = cubes(test, _MOST_CUBES)
@@ -117,24 +127,41 @@ class Relaxation:
             if value != 1 and 4 * variable + 3 in known:
                 yield 4 * variable + 3
 
-    def forbid(self, action: int) -> None:
-        """The action must not start anywhere."""
-        self.never.add(action)
-        for operator in self._operators.pop(action, ()):
-            self._counts[operator] += 1  # which nothing counts down
+    def forbid(self, action: int, partial: PartialState) -> None:
+        """The action must not start where something holds: one of its literals must not hold."""
+        if not partial.mask:
+            for operator in self._operators.pop(action, ()):
+                self._counts[operator] += 1  # which nothing counts down
+            return
+        ways = tuple(fact for literal in literals(self.packing, partial) for fact in self._opposites(literal))
+        if len(ways) > _MOST_WAYS:
+            return
+        fact = ways[0] if len(ways) == 1 else self._choice(ways)
+        self._want(fact)
+        for operator in self._operators.get(action, ()):
+            if fact not in self._needs[operator]:
+                self._needs[operator] = (*self._needs[operator], fact)
+                self._users[fact].append(operator)
+                self._counts[operator] += 1
 
-    def demand(self, action: int, partial: PartialState) -> None:
-        """The action needs more than its precondition says."""
-        self.demands[action] = united(self.demands.get(action, ANY_STATE), partial)
-        for fact in self._facts(partial):
-            if not self._is_wanted[fact]:
-                self._stale = True
-                return
-            for operator in self._operators.get(action, ()):
-                if fact not in self._needs[operator]:
-                    self._needs[operator] = (*self._needs[operator], fact)
-                    self._users[fact].append(operator)
-                    self._counts[operator] += 1
+    def _opposites(self, literal: PartialState) -> Iterator[int]:
+        """The facts of which one holds where a literal does not."""
+        (fact,) = self._facts(literal)
+        two_valued = self.packing.unknown[fact // 4] is None
+        for value in (_OPPOSITE_OF_TWO if two_valued else _OPPOSITE_OF_THREE)[fact % 4]:
+            yield fact - fact % 4 + value
+
+    def _choice(self, ways: tuple[int, ...]) -> int:
+        """A fact that takes one of some others."""
+        known = self._choices.get(ways)
+        if known is None:
+            known = self._choices[ways] = self.count
+            self.count += 1
+            self._users.append([])
+            self._wanted.append(1)
+            for way in ways:
+                self._operate((way,), (known,), -1)
+        return known
 
     def holding(self, state: int) -> list[int]:
         """The facts of a state that matter."""
@@ -156,8 +183,6 @@ class Relaxation:
 
     def estimate(self, state: int) -> Estimate | None:
         """A guess of the steps to the goal; None if it is out of reach, even in the relaxation."""
-        if self._stale:
-            self._build()
         cost = [_NEVER] * self.count
         by = [-1] * self.count
         left = self._counts.copy()
@@ -214,8 +239,6 @@ class Relaxation:
     def generalised(self, state: int) -> PartialState:
         """Enough for the goal to be out of reach in the relaxation, of a state where it is: no literal of it
         can be left out."""
-        if self._stale:
-            self._build()
         reach = _Reach(self._users, self._adds, self._counts, self.goal)
         assert reach.add([*self.holding(state), self._always])
         everything = (1 << self.packing.words * 64) - 1
@@ -231,11 +254,17 @@ class Relaxation:
             if literal.mask & implied:  # another literal says so
                 kept = rest
                 continue
-            freed = literal.mask
-            if literal.value:
-                freed |= self.exclusion.implied(literal) & ~implied & ~rest.mask
-            if reach.add(self._other_facts(freed, state)):
+            mates = self.exclusion.implied(literal) & ~implied & ~rest.mask if literal.value else 0
+            if reach.add(self._other_facts(literal.mask | mates, state)):
                 kept = rest
+            elif mates and reach.add(self._other_facts(literal.mask, state)):
+                # It matters for what it excludes; if that is little, it is said instead.
+                needed = 0
+                for mate in set_bits(mates):
+                    if not reach.add(self._other_facts(1 << mate, state)):
+                        needed |= 1 << mate
+                if needed.bit_count() <= _FEW_EXCLUDED:
+                    kept = PartialState(rest.mask | needed, rest.value)
         return kept
 
     def _other_facts(self, bits: int, state: int) -> list[int]:
