@@ -263,6 +263,8 @@ class Relaxation:
                 for mate in set_bits(mates):
                     if not reach.add(self._other_facts(1 << mate, state)):
                         needed |= 1 << mate
+                        if needed.bit_count() > _FEW_EXCLUDED:
+                            break
                 if needed.bit_count() <= _FEW_EXCLUDED:
                     kept = PartialState(rest.mask | needed, rest.value)
         return kept

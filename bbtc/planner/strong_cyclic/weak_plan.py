@@ -1,8 +1,10 @@
 """Weak plans: a sequence of steps, each one of several outcomes of an action, that leads to the goal or to where
 a policy goes on.
 
-Greedy best-first search with deferred evaluation and a second queue for what helpful actions lead to (Helmert,
-"The Fast Downward planning system", 2006; Richter, Westphal, "The LAMA planner", 2010).
+Greedy best-first search with deferred evaluation, a second queue for what helpful actions lead to (Helmert, "The Fast
+Downward planning system", 2006; Richter, Westphal, "The LAMA planner", 2010), and a third, first come first served,
+for what comes of states in which something is true that was in no other state equally far from the goal (Lipovetzky,
+Geffner, "Best-first width search", 2017), which gets out of local minima.
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from bbtc.planner.strong_cyclic.determinised import Determinised, Step
 from bbtc.planner.strong_cyclic.policy import Forbidden
 from bbtc.planner.strong_cyclic.relaxation import Estimate, Relaxation
 
+_HELPFUL, _NOVEL, _ALL = _QUEUES = (1, 2, 0)
 _BOOST = 1000  # expansions that helpful actions are preferred for after progress
+_STALLED = 250  # expansions without progress, after which the third queue is used, too
 _LOOK = 64  # evaluations between two looks at the limits
 
 
@@ -76,14 +80,19 @@ class Searcher:
         """A plan from a state to one that has ``arrived``, by steps that are not forbidden. ``on_dead_end`` is
         told every dead end of the relaxation, and the step that led to it."""
         parent: dict[int, Taken | None] = {start: None}
-        queues: tuple[list[tuple[int, int, int]], list[tuple[int, int, int]]] = ([(0, 0, start)], [])
-        priority = [0, 0]
+        queues: tuple[list[tuple[int, int, int]], ...] = ([(0, 0, start)], [], [])
+        priority = [0, 0, 0]
         expanded: dict[int, None] = {}
         dead: dict[int, None] = {}
+        novel: dict[int, int] = {}
         best: int | None = None
-        count = 0
-        while queues[0] or queues[1]:
-            which = 1 if queues[1] and (not queues[0] or priority[1] <= priority[0]) else 0
+        count = progress = 0
+        while queues[_ALL] or queues[_HELPFUL]:
+            if len(expanded) - progress == _STALLED:
+                priority[_NOVEL] = min(priority)
+            stalled = len(expanded) - progress >= _STALLED
+            usable = [number for number in _QUEUES if queues[number] and (stalled or number != _NOVEL)]
+            which = min(usable, key=lambda number: priority[number])
             priority[which] += 1
             _, _, state = heappop(queues[which])
             if state in expanded or state in dead:
@@ -97,8 +106,11 @@ class Searcher:
             self.limits.check_states(len(parent), "the search for a policy")
             if best is None or found.steps < best:
                 if best is not None:
-                    priority[1] -= _BOOST
-                best = found.steps
+                    priority[_HELPFUL] -= _BOOST
+                best, progress = found.steps, len(expanded)
+            seen = novel.get(found.steps, 0)
+            new = state & ~seen
+            novel[found.steps] = seen | state
             helpful = set(found.helpful)
             actions = self.model.applicable(state)
             actions.sort(key=lambda number: (number not in helpful, number))
@@ -113,9 +125,12 @@ class Searcher:
                     if arrived(after):
                         return _traced(parent, after)
                     count += 1
-                    heappush(queues[0], (found.steps, count, after))
+                    entry = (found.steps, count, after)
+                    heappush(queues[_ALL], entry)
                     if number in helpful:
-                        heappush(queues[1], (found.steps, count, after))
+                        heappush(queues[_HELPFUL], entry)
+                    if new:
+                        heappush(queues[_NOVEL], (count, count, after))
         return Exhausted(tuple(expanded), tuple(dead))
 
 
