@@ -12,7 +12,6 @@ from bbtc.planner.strong_cyclic.determinised import Action, Determinised, Step
 from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import (
     PartialState,
-    contains,
     contradict,
     literals,
     satisfied,
@@ -129,28 +128,21 @@ class DeadEnds:
         """Why a state is not in the goal, and the actions that may not start in it may not."""
         model = self.model
         found = model.reasons.why_not(model.goal, state)
-        idle: list[Action] = []
+        idle: list[PartialState] = []
+        others: list[Action] = []
         for action in model.actions:
-            if not satisfied(action.test, state):
-                idle.append(action)
-                continue
             reason = self.forbidden.forbids(state, action.number)
-            if reason is not None:
-                found = united(found, reason)
-        for action in idle:
-            known = self.exclusion.closed(found)
-            if action.needs is not None and all(contradict(known, need) for need in action.needs):
-                continue
-            if any(contains(each, state) for each in self.forbidden.of_action.get(action.number, ())):
-                reason = min(
-                    (e for e in self.forbidden.of_action[action.number] if contains(e, state)),
-                    key=lambda e: (e.mask & ~known.mask).bit_count(),
-                )
-                other = model.reasons.why_not(action.test, state, known.mask)
-                if (reason.mask & ~known.mask).bit_count() < (other.mask & ~known.mask).bit_count():
+            if satisfied(action.test, state):
+                if reason is not None:
                     found = united(found, reason)
-                    continue
-            found = united(found, model.reasons.why_not(action.test, state, known.mask))
+            elif reason is not None and not reason.mask:
+                continue
+            elif action.needs is None:
+                others.append(action)
+            else:
+                idle.extend(action.needs)
+        found = self.exclusion.refuting(model.reasons, idle, state, found)
+        for action in others:
+            known = self.exclusion.closed(found).mask
+            found = united(found, model.reasons.why_not(action.test, state, known))
         return found
-
-

@@ -9,7 +9,7 @@ section 5; here the check is done on the ground actions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -18,7 +18,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import ALWAYS, set_bits
 from bbtc.planner.strong_cyclic.determinised import Action, Determinised
-from bbtc.planner.strong_cyclic.partial_state import PartialState
+from bbtc.planner.strong_cyclic.partial_state import PartialState, Reasons, contradict, united
 
 _MOST_GUESSES = 200
 _MOST_PARTS = 4  # predicates of one group
@@ -82,6 +82,53 @@ class Exclusion:
     def shortest(self, partial: PartialState) -> PartialState:
         """Without what the rest of it implies."""
         return PartialState(partial.mask & ~(self.implied(partial) & ~partial.value), partial.value)
+
+
+    def refuting(
+        self, reasons: Reasons, partials: Iterable[PartialState], state: int, known: PartialState
+    ) -> PartialState:
+        """``known``, which a state satisfies, with enough of the state for none of some partial states to hold, none
+        of which holds in it. Of the literals that do so, the one that rules out the most is taken first."""
+        closed = self.closed(known)
+        ways_of: dict[int, PartialState] = {}
+        waiting: list[list[PartialState]] = []
+        for partial in partials:
+            if contradict(closed, partial):
+                continue
+            wrong = (state ^ partial.value) & partial.mask
+            ways: dict[PartialState, None] = {}
+            for bit in set_bits(wrong):
+                key = 2 * bit + (partial.value >> bit & 1)
+                if key not in ways_of:
+                    only = PartialState(1 << bit, partial.value & 1 << bit)
+                    ways_of[key] = self._strongest(reasons.differs(only, state), state)
+                ways[ways_of[key]] = None
+            waiting.append(list(ways))
+        counts: dict[PartialState, int] = {}
+        for options in waiting:
+            for way in options:
+                counts[way] = counts.get(way, 0) + 1
+        while waiting:
+            best = max(counts, key=lambda way: (counts[way], way.value != 0, -way.mask))
+            known = united(known, best)
+            rest: list[list[PartialState]] = []
+            for options in waiting:
+                if best in options:
+                    for way in options:
+                        counts[way] -= 1
+                else:
+                    rest.append(options)
+            waiting = rest
+        return known
+
+    def _strongest(self, literal: PartialState, state: int) -> PartialState:
+        """What implies a literal of a state: that another member of its group is true."""
+        variable = literal.mask.bit_length() - 1
+        if not literal.value and variable in self.mates:
+            mates = state & self.mates[variable]
+            if mates:
+                return PartialState(mates & -mates, mates & -mates)
+        return literal
 
 
 class _Search:

@@ -23,7 +23,6 @@ from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import (
     PartialState,
     contains,
-    contradict,
     satisfied,
     united,
 )
@@ -162,13 +161,10 @@ class Solver:
 
     def _allowed(self, partial: PartialState, state: int, action: int) -> PartialState:
         """With enough for an action not to be forbidden that is not in the state."""
-        for each in self.forbidden.of_action.get(action, ()):
-            if contains(each, state):
-                continue
-            known = self.exclusion.closed(partial)
-            if not contradict(each, known):
-                partial = united(partial, self.model.reasons.differs(each, state, known.mask))
-        return partial
+        against = [
+            each for each in self.forbidden.of_action.get(action, ()) if not contains(each, state)
+        ]
+        return self.exclusion.refuting(self.model.reasons, against, state, partial)
 
     # --- why ------------------------------------------------------------------------------------
 
@@ -176,18 +172,15 @@ class Solver:
         """Enough for the policy to start the same action as by a pair in a state."""
         pair = self.policy.pairs[choice]
         found = self._allowed(pair.partial, state, pair.action)
-        known = self.exclusion.closed(found)
         last = self.policy.order(choice)
-        for other_number, other in enumerate(self.policy.pairs):
-            if other.action == pair.action or self.policy.order(other_number) > last:
+        against: list[PartialState] = []
+        for number, other in enumerate(self.policy.pairs):
+            if other.action == pair.action or self.policy.order(number) > last:
                 continue
-            if contradict(known, other.partial):
+            if not contains(other.partial, state):
+                against.append(other.partial)
                 continue
-            reason = None
-            if contains(other.partial, state):
-                reason = self.forbidden.forbids(state, other.action)
-            if reason is None:
-                reason = self.model.reasons.differs(other.partial, state, known.mask)
+            reason = self.forbidden.forbids(state, other.action)
+            assert reason is not None
             found = united(found, reason)
-            known = self.exclusion.closed(found)
-        return found
+        return self.exclusion.refuting(self.model.reasons, against, state, found)
