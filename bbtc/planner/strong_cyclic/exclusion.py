@@ -51,7 +51,7 @@ class _Making:
 
 class Exclusion:
     """The groups found. ``groups`` are lists of variables, in order; ``mates[v]`` are the bits of all that are
-    false while v is true, where there are any."""
+    false while v is true, where there are any; ``members`` are the bits of all variables in groups."""
 
     def __init__(self, model: Determinised, limits: Limits) -> None:
         self.groups: list[list[int]] = _Search(model, limits).groups()
@@ -60,13 +60,13 @@ class Exclusion:
             bits = sum(1 << variable for variable in group)
             for variable in group:
                 self.mates[variable] = self.mates.get(variable, 0) | bits & ~(1 << variable)
-        self._members = sum(1 << variable for variable in self.mates)
+        self.members = sum(1 << variable for variable in self.mates)
 
     def implied(self, partial: PartialState) -> int:
         """The bits of the variables that are false in every reachable state that satisfies it, because
         another one is true."""
         found = 0
-        for bit in set_bits(partial.value & self._members):
+        for bit in set_bits(partial.value & self.members):
             found |= self.mates[bit]
         return found
 
@@ -90,28 +90,35 @@ class Exclusion:
         """``known``, which a state satisfies, with enough of the state for none of some partial states to hold, none
         of which holds in it. Of the literals that do so, the one that rules out the most is taken first."""
         closed = self.closed(known)
-        ways_of: dict[int, PartialState] = {}
-        waiting: list[list[PartialState]] = []
+        ways: list[PartialState] = []
+        number: dict[PartialState, int] = {}
+        way_of: dict[int, int] = {}
+        waiting: list[list[int]] = []
         for partial in partials:
             if contradict(closed, partial):
                 continue
-            wrong = (state ^ partial.value) & partial.mask
-            ways: dict[PartialState, None] = {}
-            for bit in set_bits(wrong):
+            options: list[int] = []
+            for bit in set_bits((state ^ partial.value) & partial.mask):
                 key = 2 * bit + (partial.value >> bit & 1)
-                if key not in ways_of:
+                if key not in way_of:
                     only = PartialState(1 << bit, partial.value & 1 << bit)
-                    ways_of[key] = self._strongest(reasons.differs(only, state), state)
-                ways[ways_of[key]] = None
-            waiting.append(list(ways))
-        counts: dict[PartialState, int] = {}
+                    literal = self._strongest(reasons.differs(only, state), state)
+                    way_of[key] = number.setdefault(literal, len(ways))
+                    if way_of[key] == len(ways):
+                        ways.append(literal)
+                if way_of[key] not in options:
+                    options.append(way_of[key])
+            waiting.append(options)
+        counts = [0] * len(ways)
         for options in waiting:
             for way in options:
-                counts[way] = counts.get(way, 0) + 1
+                counts[way] += 1
         while waiting:
-            best = max(counts, key=lambda way: (counts[way], way.value != 0, -way.mask))
-            known = united(known, best)
-            rest: list[list[PartialState]] = []
+            best = max(
+                range(len(ways)), key=lambda way: (counts[way], ways[way].value != 0, -ways[way].mask)
+            )
+            known = united(known, ways[best])
+            rest: list[list[int]] = []
             for options in waiting:
                 if best in options:
                     for way in options:

@@ -44,6 +44,10 @@ class Relaxation:
         self.count = 4 * len(self.packing.unknown) + 2
         self.goal = self.count - 2
         self._always = self.count - 1
+        self._full = self._two_valued = 0
+        for variable, at in enumerate(self.packing.unknown):
+            self._full |= self.packing.bits(variable)
+            self._two_valued |= 0 if at is not None else 1 << variable
         self._build()
 
     # --- operators ------------------------------------------------------------------------------
@@ -241,38 +245,38 @@ class Relaxation:
         can be left out."""
         reach = _Reach(self._users, self._adds, self._counts, self.goal)
         assert reach.add([*self.holding(state), self._always])
-        everything = (1 << self.packing.words * 64) - 1
-        full = 0
-        for variable in range(len(self.packing.unknown)):
-            full |= self.packing.bits(variable)
-        kept = self.exclusion.shortest(PartialState(full & everything, state))
-        order = literals(self.packing, kept)
-        order.sort(key=lambda literal: literal.value != 0)
-        for literal in order:
-            rest = without(kept, literal.mask)
-            implied = self.exclusion.implied(rest)
-            if literal.mask & implied:  # another literal says so
-                kept = rest
-                continue
-            mates = self.exclusion.implied(literal) & ~implied & ~rest.mask if literal.value else 0
-            if reach.add(self._other_facts(literal.mask | mates, state)):
-                kept = rest
-            elif mates and reach.add(self._other_facts(literal.mask, state)):
-                # It matters for what it excludes; if that is little, it is said instead.
-                needed = 0
-                for mate in set_bits(mates):
-                    if not reach.add(self._other_facts(1 << mate, state)):
-                        needed |= 1 << mate
-                        if needed.bit_count() > _FEW_EXCLUDED:
-                            break
-                if needed.bit_count() <= _FEW_EXCLUDED:
-                    kept = PartialState(rest.mask | needed, rest.value)
+        kept = self.exclusion.shortest(PartialState(self._full, state & self._full))
+        # What would be true without them, and makes no difference.
+        kept = without(kept, ~state & self._two_valued & ~self._masks[2])
+        for literal in sorted(literals(self.packing, kept), key=lambda each: each.value != 0):
+            kept = self._freed(reach, kept, literal)
         return kept
 
-    def _other_facts(self, bits: int, state: int) -> list[int]:
-        """All values that the variables of some bits may have besides those in the state."""
+    def _freed(self, reach: _Reach, kept: PartialState, literal: PartialState) -> PartialState:
+        """A partial state without a literal of it, if the goal stays out of reach."""
+        rest = without(kept, literal.mask)
+        mates = 0
+        if literal.value & self.exclusion.members:
+            mates = self.exclusion.implied(literal) & ~self.exclusion.implied(rest) & ~rest.mask
+        facts = self._other_facts(literal.mask)
+        if reach.add([*facts, *self._other_facts(mates)]):
+            return rest
+        if mates and reach.add(facts):
+            # It matters for what it excludes; if that is little, it is said instead.
+            needed = 0
+            for mate in set_bits(mates):
+                if not reach.add(self._other_facts(1 << mate)):
+                    needed |= 1 << mate
+                    if needed.bit_count() > _FEW_EXCLUDED:
+                        return kept
+            return PartialState(rest.mask | needed, rest.value)
+        return kept
+
+    def _other_facts(self, bits: int) -> list[int]:
+        """All values of the variables of some bits."""
         found: list[int] = []
-        for variable in sorted({self.packing.owner(bit) for bit in set_bits(bits)}):
+        for bit in set_bits(bits):
+            variable = self.packing.owner(bit)
             values = (0, 2) if self.packing.unknown[variable] is None else (0, 1, 2, 3)
             found.extend(4 * variable + value for value in values)
         return found

@@ -134,7 +134,9 @@ class Solver:
                 case WeakPlan():
                     self._add_pairs(found)
                 case Exhausted():
-                    if found.seen:
+                    if self.searcher.estimate_anew(state) is None:
+                        self.dead_ends.of_relaxation(state, None)
+                    else:
                         self.dead_ends.of_search(found, state)
                     return None
 

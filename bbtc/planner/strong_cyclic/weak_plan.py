@@ -70,6 +70,12 @@ class Searcher:
         found = self._estimates[state] = self.relaxation.estimate(state)
         return found
 
+    def estimate_anew(self, state: int) -> Estimate | None:
+        """How far the goal is by all that is forbidden now."""
+        if self._estimates.get(state) is not None:
+            del self._estimates[state]
+        return self.estimate(state)
+
     def forget(self) -> None:
         """Guess anew, since more is forbidden; dead ends stay dead."""
         self._estimates = {each: found for each, found in self._estimates.items() if found is None}
