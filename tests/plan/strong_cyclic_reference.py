@@ -1,7 +1,7 @@
 """Which states have a strong cyclic policy, by enumerating all states: written apart from the planner.
 
-Source: Cimatti, Pistore, Roveri, Traverso, "Weak, strong, and strong cyclic planning via symbolic model checking"
-(2003): take away what can no longer stay within the rest and reach the goal, until nothing changes.
+Source: Cimatti, Pistore, Roveri, Traverso, "Weak, strong, and strong cyclic planning via symbolic model
+checking" (2003): take away what can no longer stay within the rest and reach the goal, until nothing changes.
 """
 
 from __future__ import annotations

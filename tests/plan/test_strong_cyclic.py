@@ -59,7 +59,9 @@ def test_what_is_learnt_of_dead_ends_and_invariants_is_true_of_every_reachable_s
         if evaluate(of.goal, values) is Truth.TRUE:
             continue
         for number, action in enumerate(of.actions):
-            if evaluate(action.precondition, values) is Truth.TRUE and solver.forbidden.forbids(state, number):
+            if evaluate(action.precondition, values) is Truth.TRUE and solver.forbidden.forbids(
+                state, number
+            ):
                 results = compile_action(action, Limits())(values)
                 assert not {result.values for result in results} <= safe
 
@@ -106,5 +108,3 @@ def test_the_quotient_of_a_chain_has_the_figures_of_the_chain(of: Task) -> None:
     assert violations(of, quotient) == []
     whole, small = figures(of, root, chain), figures(of, root, quotient)
     assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
-
-

@@ -1,9 +1,9 @@
 """Dead ends, and what must not be done because it may lead to one.
 
-A dead end is a state from which no strong cyclic policy reaches the goal. What is known of one holds for every
-state that satisfies a partial state of it; regressed through every action that may lead there, it becomes pairs of
-partial state and action that are forbidden. Source: Muise, McIlraith, Beck, "Improved non-deterministic planning by
-exploiting state relevance" (2012).
+A dead end is a state from which no strong cyclic policy reaches the goal. What is known of one holds for
+every state that satisfies a partial state of it; regressed through every action that may lead there, it
+becomes pairs of partial state and action that are forbidden. Source: Muise, McIlraith, Beck, "Improved
+non-deterministic planning by exploiting state relevance" (2012).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The all-outcomes determinisation of a task over bits: every outcome of an action as a step of its own.
 
-Source of the idea: Yoon, Fern, Givan, "FF-Replan" (2007); of regression to what a step needs: Muise, McIlraith,
-Beck, "Improved non-deterministic planning by exploiting state relevance" (2012).
+Source of the idea: Yoon, Fern, Givan, "FF-Replan" (2007); of regression to what a step needs: Muise,
+McIlraith, Beck, "Improved non-deterministic planning by exploiting state relevance" (2012).
 """
 
 from __future__ import annotations
@@ -169,8 +169,8 @@ class Determinised:
     # --- regression ---------------------------------------------------------------------------
 
     def needed(self, action: int, step: Step, state: int, wanted: PartialState) -> PartialState:
-        """What of a state, in which an action may start and leads by a step to ``wanted``, is enough for that:
-        whatever satisfies it may start the action, and gets to ``wanted`` by the same step."""
+        """What of a state, in which an action may start and leads by a step to ``wanted``, is enough for
+        that: whatever satisfies it may start the action, and gets to ``wanted`` by the same step."""
         found = self.reasons.why(self.actions[action].test, state)
         return united(found, self.before(step, state, wanted, found.mask))
 
@@ -232,5 +232,3 @@ def _joint(factors: tuple[Factor, ...]) -> Iterator[frozenset[Effect]]:
             )
         total = dict.fromkeys(one | other for one in total for other in drawn)
     yield from total
-
-

@@ -1,10 +1,10 @@
 """Groups of variables of which at most one is true in every reachable state, such as the places of a robot.
 
 A group is guessed from names: the ground predicates of a symbol that agree in all arguments but at most one,
-together with those of other symbols that share these arguments. A guess is kept if at most one member is true in
-every initial state, and every action that makes one true makes one false that it needs to be true. Source of
-guess, check and repair: Helmert, "Concise finite-domain representations for PDDL planning tasks" (2009),
-section 5; here the check is done on the ground actions.
+together with those of other symbols that share these arguments. A guess is kept if at most one member is
+true in every initial state, and every action that makes one true makes one false that it needs to be true.
+Source of guess, check and repair: Helmert, "Concise finite-domain representations for PDDL planning tasks"
+(2009), section 5; here the check is done on the ground actions.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ class _Making:
 
 
 class Exclusion:
-    """The groups found. ``groups`` are lists of variables, in order; ``mates[v]`` are the bits of all that are
-    false while v is true, where there are any; ``members`` are the bits of all variables in groups."""
+    """The groups found. ``groups`` are lists of variables, in order; ``mates[v]`` are the bits of all that
+    are false while v is true, where there are any; ``members`` are the bits of all variables in groups."""
 
     def __init__(self, model: Determinised, limits: Limits) -> None:
         self.groups: list[list[int]] = _Search(model, limits).groups()
@@ -83,12 +83,12 @@ class Exclusion:
         """Without what the rest of it implies."""
         return PartialState(partial.mask & ~(self.implied(partial) & ~partial.value), partial.value)
 
-
     def refuting(
         self, reasons: Reasons, partials: Iterable[PartialState], state: int, known: PartialState
     ) -> PartialState:
-        """``known``, which a state satisfies, with enough of the state for none of some partial states to hold, none
-        of which holds in it. Of the literals that do so, the one that rules out the most is taken first."""
+        """``known``, which a state satisfies, with enough of the state for none of some partial states to
+        hold, none of which holds in it. Of the literals that do so, the one that rules out the most is
+        taken first."""
         closed = self.closed(known)
         ways: list[PartialState] = []
         number: dict[PartialState, int] = {}
@@ -114,9 +114,7 @@ class Exclusion:
             for way in options:
                 counts[way] += 1
         while waiting:
-            best = max(
-                range(len(ways)), key=lambda way: (counts[way], ways[way].value != 0, -ways[way].mask)
-            )
+            best = max(range(len(ways)), key=lambda way: (counts[way], ways[way].value != 0, -ways[way].mask))
             known = united(known, ways[best])
             rest: list[list[int]] = []
             for options in waiting:
@@ -181,9 +179,7 @@ class _Search:
             better = self._check(guess, groups)
             if better is None:
                 found.update(
-                    (tuple(members), None)
-                    for members in self._initially(groups)
-                    if len(members) > 1
+                    (tuple(members), None) for members in self._initially(groups) if len(members) > 1
                 )
                 continue
             for repaired in better:
@@ -210,7 +206,8 @@ class _Search:
         """The groups with at most one true member in every initial state."""
         for _, members in sorted(groups.items()):
             if all(
-                sum(state.values[member] is Truth.TRUE for member in members) <= 1 for state in self.task.initial
+                sum(state.values[member] is Truth.TRUE for member in members) <= 1
+                for state in self.task.initial
             ):
                 yield members
 

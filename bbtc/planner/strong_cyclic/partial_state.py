@@ -1,8 +1,8 @@
 """Partial states: what must be known of a state for something to hold.
 
-A state is an integer of bits (:class:`bbtc.planner.mdp.packing.Packing`), and a partial state a conjunction of
-literals over these bits: a mask of those that matter, and their values. Everything here tells of a concrete
-state *why* something holds in it, as a partial state that the state satisfies and that is enough.
+A state is an integer of bits (:class:`bbtc.planner.mdp.packing.Packing`), and a partial state a conjunction
+of literals over these bits: a mask of those that matter, and their values. Everything here tells of a
+concrete state *why* something holds in it, as a partial state that the state satisfies and that is enough.
 """
 
 from __future__ import annotations

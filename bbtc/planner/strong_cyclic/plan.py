@@ -1,5 +1,5 @@
-"""The strategy ``strong-cyclic``: a policy over partial states that reaches the goal with probability 1, written down
-as rules; where there is none, it says so."""
+"""The strategy ``strong-cyclic``: a policy over partial states that reaches the goal with probability 1,
+written down as rules; where there is none, it says so."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from bbtc.rewrite.simplify import numbered, size
 from bbtc.tree.nodes import ConditionNode, Node, Status
 
 _FEW_STATES = 2_000
-"""A tree with so many states is simulated in all of them; one with more, in as many as differ in what matters."""
+"""A tree with so many states is simulated in all of them; one with more, in as many as differ in what
+matters."""
 
 
 def plan_strong_cyclic(
@@ -32,8 +33,8 @@ def plan_strong_cyclic(
     progress: Progress,  # noqa: ARG001
     options: Options = DEFAULTS,
 ) -> Plan:
-    """Plan for probability 1. Always returns: where there is no such policy, or a limit is reached, with a tree
-    that only reads the goal."""
+    """Plan for probability 1. Always returns: where there is no such policy, or a limit is reached, with a
+    tree that only reads the goal."""
     goal: Node = numbered(ConditionNode("", task.goal))
     best = BestTree.start(task, target, options.best, goal, limits)
     status: Status = "stuck"

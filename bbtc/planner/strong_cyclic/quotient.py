@@ -1,11 +1,12 @@
 """The chain of a tree with states that are alike in all that matters taken for one.
 
-What a tick reads of a state is enough for the same action to be started; what of a state is enough for the whole
-run to go the same way is an explanation of it (:mod:`bbtc.planner.strong_cyclic.visit`). States with the explanation
-of another one have runs of the same actions, outcomes, costs and ends, with the same probabilities: the chain over
-visited states is a quotient of the whole chain by a probabilistic bisimulation (Larsen, Skou, "Bisimulation through
-probabilistic testing", 1991), and its figures are those of the tree. All of it counts on invariants of reachable
-states only (:mod:`bbtc.planner.strong_cyclic.exclusion`).
+What a tick reads of a state is enough for the same action to be started; what of a state is enough for the
+whole run to go the same way is an explanation of it (:mod:`bbtc.planner.strong_cyclic.visit`). States with
+the explanation of another one have runs of the same actions, outcomes, costs and ends, with the same
+probabilities: the chain over visited states is a quotient of the whole chain by a probabilistic
+bisimulation (Larsen, Skou, "Bisimulation through probabilistic testing", 1991), and its figures are those
+of the tree. All of it counts on invariants of reachable states only
+(:mod:`bbtc.planner.strong_cyclic.exclusion`).
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, action
 def quotient_chain(
     task: Task, root: Node, limits: Limits, model: Determinised, exclusion: Exclusion
 ) -> Chain:
-    """The quotient of the chain of a tree that remembers nothing. Raises ``LimitReached``; ``ValueError`` for a
-    tree with latched actions or retry nodes."""
+    """The quotient of the chain of a tree that remembers nothing. Raises ``LimitReached``; ``ValueError``
+    for a tree with latched actions or retry nodes."""
     if any(action.latched for action in actions_of(root)) or any(
         isinstance(node, ControlNode) and node.kind == "retry" for node in walk(root)
     ):

@@ -1,8 +1,8 @@
 """The delete relaxation of a determinised task: how far the goal is, what helps, what is a dead end.
 
-Costs are those of the additive heuristic, from which a relaxed plan is read off (Hoffmann, Nebel, "The FF planning
-system", 2001; Keyder, Geffner, "Heuristics for planning with action costs revisited", 2008). A variable takes
-a value, unknown among them, as a fact of its own.
+Costs are those of the additive heuristic, from which a relaxed plan is read off (Hoffmann, Nebel, "The FF
+planning system", 2001; Keyder, Geffner, "Heuristics for planning with action costs revisited", 2008). A
+variable takes a value, unknown among them, as a fact of its own.
 """
 
 from __future__ import annotations

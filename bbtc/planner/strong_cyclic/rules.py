@@ -1,8 +1,8 @@
 """From a policy to rules, and from rules to a tree: ``Fallback(goal, Sequence(guard, action)…)``.
 
-Rules are tried in the order of their distance to the goal. The guard of a rule holds what the action's precondition
-needs, what keeps the action from being forbidden, and of what the rest of the plan needs as much as tells the rule
-from others. Every guard is true or false in every state: unknown counts as false.
+Rules are tried in the order of their distance to the goal. The guard of a rule holds what the action's
+precondition needs, what keeps the action from being forbidden, and of what the rest of the plan needs as
+much as tells the rule from others. Every guard is true or false in every state: unknown counts as false.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """Holds where ``partial`` does, and none of ``excluded``. ``kept`` are the bits of literals that are more than
-    a help to tell rules apart."""
+    """Holds where ``partial`` does, and none of ``excluded``. ``kept`` are the bits of literals that are
+    more than a help to tell rules apart."""
 
     partial: PartialState
     excluded: tuple[PartialState, ...]
@@ -76,12 +76,11 @@ class Rules:
 
     def plain(self) -> list[Rule]:
         """A rule for each pair, with all that the rest of the plan needs."""
-        return [
-            Rule((self._guard(pair.partial, pair.action),), pair.action) for pair in self.solved.pairs
-        ]
+        return [Rule((self._guard(pair.partial, pair.action),), pair.action) for pair in self.solved.pairs]
 
     def short(self) -> list[Rule]:
-        """Rules that decide alike in all states that were visited, with less in their guards, fewer of them."""
+        """Rules that decide alike in all states that were visited, with less in their guards, fewer of
+        them."""
         rules = self._merged(self.plain())
         undecided = [state for state in self.solved.visited if not self._in_goal(state)]
         found: list[Rule] = []
@@ -231,9 +230,7 @@ def _condition(task: Task, model: Determinised, rule: Rule) -> Condition:
     for guard in rule.guards[1:]:
         differ = shared.mask & guard.partial.mask & ~(shared.value ^ guard.partial.value)
         common = [
-            literal
-            for literal in literals(model.packing, shared)
-            if literal.mask & differ == literal.mask
+            literal for literal in literals(model.packing, shared) if literal.mask & differ == literal.mask
         ]
         shared = PartialState(sum(each.mask for each in common), sum(each.value for each in common))
     precondition = task.actions[rule.action].precondition
@@ -242,9 +239,7 @@ def _condition(task: Task, model: Determinised, rule: Rule) -> Condition:
     ways = []
     for guard in rule.guards:
         own = list(_certain(task, model, without(guard.partial, shared.mask)))
-        own.extend(
-            disjunction(_certain(task, model, each, negated=True)) for each in guard.excluded
-        )
+        own.extend(disjunction(_certain(task, model, each, negated=True)) for each in guard.excluded)
         ways.append(conjunction(own))
     return conjunction([*parts, disjunction(ways)])
 
@@ -264,8 +259,10 @@ def _certain(
 ) -> Iterator[Condition]:
     for condition in as_conditions(model.packing, partial):
         whole = certainly(task, condition)
-        yield certainly(task, negation(condition)) if negated and whole == condition else (
-            negation(whole) if negated else whole
+        yield (
+            certainly(task, negation(condition))
+            if negated and whole == condition
+            else (negation(whole) if negated else whole)
         )
 
 

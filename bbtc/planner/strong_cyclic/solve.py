@@ -1,9 +1,9 @@
 """Strong cyclic planning: from weak plans and what their steps need to a policy that always gets on.
 
-Every state that the policy may lead to is visited, depth first. Where no pair applies, a weak plan is made, to the
-goal or to where the policy applies again, and each of its steps regressed to a pair. Where there is none, a dead end
-is learnt from, and what led to it is forbidden. A round in which nothing was added proves the policy: see
-:mod:`bbtc.planner.strong_cyclic.visit`.
+Every state that the policy may lead to is visited, depth first. Where no pair applies, a weak plan is made,
+to the goal or to where the policy applies again, and each of its steps regressed to a pair. Where there is
+none, a dead end is learnt from, and what led to it is forbidden. A round in which nothing was added proves
+the policy: see :mod:`bbtc.planner.strong_cyclic.visit`.
 
 Sources: Muise, McIlraith, Beck, "Improved non-deterministic planning by exploiting state relevance" (2012);
 Muise, McIlraith, Beck, "PRP rebooted: advancing the state of the art in FOND planning" (2024).
@@ -163,9 +163,7 @@ class Solver:
 
     def _allowed(self, partial: PartialState, state: int, action: int) -> PartialState:
         """With enough for an action not to be forbidden that is not in the state."""
-        against = [
-            each for each in self.forbidden.of_action.get(action, ()) if not contains(each, state)
-        ]
+        against = [each for each in self.forbidden.of_action.get(action, ()) if not contains(each, state)]
         return self.exclusion.refuting(self.model.reasons, against, state, partial)
 
     # --- why ------------------------------------------------------------------------------------

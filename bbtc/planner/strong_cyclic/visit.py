@@ -1,9 +1,9 @@
 """All states that decisions lead to, where states that are alike in all that matters are visited once.
 
-States are visited depth first. When all states that some states lead to are done, each of them is explained: what
-of it is enough for the same actions to be started from there on, whatever their outcomes. Any other state that
-satisfies such an explanation, by a run of the same actions and outcomes, gets to states that satisfy the
-explanations of those this one gets to; so it need not be visited.
+States are visited depth first. When all states that some states lead to are done, each of them is
+explained: what of it is enough for the same actions to be started from there on, whatever their outcomes.
+Any other state that satisfies such an explanation, by a run of the same actions and outcomes, gets to
+states that satisfy the explanations of those this one gets to; so it need not be visited.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class Decisions(Protocol):
 
 @dataclass(slots=True)
 class Node:
-    """A visited state. ``choice`` is what was decided; ``edges`` are the steps of its action and what they lead
-    to, looked at up to ``position``. ``why`` explains it, ``why_final`` why nothing is started."""
+    """A visited state. ``choice`` is what was decided; ``edges`` are the steps of its action and what they
+    lead to, looked at up to ``position``. ``why`` explains it, ``why_final`` why nothing is started."""
 
     state: int
     index: int
@@ -64,8 +64,8 @@ class Node:
 
 
 class Visit:
-    """One visit. ``explained`` are the explanations found, and ``owners`` the states that they are of; ``trapped``
-    tells whether there are states from which decisions never lead to a final one."""
+    """One visit. ``explained`` are the explanations found, and ``owners`` the states that they are of;
+    ``trapped`` tells whether there are states from which decisions never lead to a final one."""
 
     def __init__(self, decisions: Decisions) -> None:
         self.decisions = decisions
@@ -179,7 +179,8 @@ class Visit:
 
 
 def _leaves(members: list[Node]) -> bool:
-    """Can decisions lead from each of some states, that lead to one another, out of them or to a final one?"""
+    """Can decisions lead from each of some states, that lead to one another, out of them or to a final
+    one?"""
     inside = {node.state for node in members}
     back: dict[int, list[int]] = {}
     leaving: list[int] = []

@@ -1,10 +1,10 @@
-"""Weak plans: a sequence of steps, each one of several outcomes of an action, that leads to the goal or to where
-a policy goes on.
+"""Weak plans: a sequence of steps, each one of several outcomes of an action, that leads to the goal or to
+where a policy goes on.
 
-Greedy best-first search with deferred evaluation, a second queue for what helpful actions lead to (Helmert, "The Fast
-Downward planning system", 2006; Richter, Westphal, "The LAMA planner", 2010), and a third, first come first served,
-for what comes of states in which something is true that was in no other state equally far from the goal (Lipovetzky,
-Geffner, "Best-first width search", 2017), which gets out of local minima.
+Greedy best-first search with deferred evaluation, a second queue for what helpful actions lead to (Helmert,
+"The Fast Downward planning system", 2006; Richter, Westphal, "The LAMA planner", 2010), and a third, first
+come first served, for what comes of states in which something is true that was in no other state equally
+far from the goal (Lipovetzky, Geffner, "Best-first width search", 2017), which gets out of local minima.
 """
 
 from __future__ import annotations
@@ -12,17 +12,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from bbtc.limits import Limits
 from bbtc.planner.strong_cyclic.determinised import Determinised, Step
 from bbtc.planner.strong_cyclic.policy import Forbidden
 from bbtc.planner.strong_cyclic.relaxation import Estimate, Relaxation
 
-_HELPFUL, _NOVEL, _ALL = _QUEUES = (1, 2, 0)
+_HELPFUL, _NOVEL, _ALL = 1, 2, 0
+_QUEUES = (_HELPFUL, _NOVEL, _ALL)  # in this order where their priorities are equal
 _BOOST = 1000  # expansions that helpful actions are preferred for after progress
 _STALLED = 250  # expansions without progress, after which the third queue is used, too
 _LOOK = 64  # evaluations between two looks at the limits
+
+
+_Entry: TypeAlias = tuple[tuple[int, int], int, int]
 
 
 class Taken(NamedTuple):
@@ -43,8 +47,8 @@ class WeakPlan:
 
 @dataclass(frozen=True, slots=True)
 class Exhausted:
-    """There is no weak plan. ``seen`` are all states that can be reached, in order, but for what follows dead ends
-    of the relaxation, which are ``dead``."""
+    """There is no weak plan. ``seen`` are all states that can be reached, in order, but for what follows
+    dead ends of the relaxation, which are ``dead``."""
 
     seen: tuple[int, ...]
     dead: tuple[int, ...]
@@ -83,40 +87,23 @@ class Searcher:
     def search(
         self, start: int, arrived: Callable[[int], bool], on_dead_end: Callable[[int, Taken | None], None]
     ) -> WeakPlan | Exhausted:
-        """A plan from a state to one that has ``arrived``, by steps that are not forbidden. ``on_dead_end`` is
-        told every dead end of the relaxation, and the step that led to it."""
+        """A plan from a state to one that has ``arrived``, by steps that are not forbidden. ``on_dead_end``
+        is told every dead end of the relaxation, and the step that led to it."""
         parent: dict[int, Taken | None] = {start: None}
-        queues: tuple[list[tuple[int, int, int]], ...] = ([(0, 0, start)], [], [])
-        priority = [0, 0, 0]
-        expanded: dict[int, None] = {}
+        depth = {start: 0}
+        frontier = _Frontier(start)
         dead: dict[int, None] = {}
-        novel: dict[int, int] = {}
-        best: int | None = None
-        count = progress = 0
-        while queues[_ALL] or queues[_HELPFUL]:
-            if len(expanded) - progress == _STALLED:
-                priority[_NOVEL] = min(priority)
-            stalled = len(expanded) - progress >= _STALLED
-            usable = [number for number in _QUEUES if queues[number] and (stalled or number != _NOVEL)]
-            which = min(usable, key=lambda number: priority[number])
-            priority[which] += 1
-            _, _, state = heappop(queues[which])
-            if state in expanded or state in dead:
+        while frontier:
+            state = frontier.pop()
+            if state in frontier.expanded or state in dead:
                 continue
             found = self.estimate(state)
             if found is None:
                 dead[state] = None
                 on_dead_end(state, parent[state])
                 continue
-            expanded[state] = None
             self.limits.check_states(len(parent), "the search for a policy")
-            if best is None or found.steps < best:
-                if best is not None:
-                    priority[_HELPFUL] -= _BOOST
-                best, progress = found.steps, len(expanded)
-            seen = novel.get(found.steps, 0)
-            new = state & ~seen
-            novel[found.steps] = seen | state
+            novel = frontier.expand(state, found.steps)
             helpful = set(found.helpful)
             actions = self.model.applicable(state)
             actions.sort(key=lambda number: (number not in helpful, number))
@@ -128,16 +115,59 @@ class Searcher:
                     if after in parent:
                         continue
                     parent[after] = Taken(state, number, step)
+                    depth[after] = depth[state] + 1
                     if arrived(after):
                         return _traced(parent, after)
-                    count += 1
-                    entry = (found.steps, count, after)
-                    heappush(queues[_ALL], entry)
-                    if number in helpful:
-                        heappush(queues[_HELPFUL], entry)
-                    if new:
-                        heappush(queues[_NOVEL], (count, count, after))
-        return Exhausted(tuple(expanded), tuple(dead))
+                    frontier.push(after, (found.steps, depth[after]), number in helpful, novel)
+        return Exhausted(tuple(frontier.expanded), tuple(dead))
+
+
+class _Frontier:
+    """The states to expand, in three queues: all, by what is left to the goal from the state before, then
+    by the steps so far; those that helpful actions lead to; those that novel states lead to, in the order
+    of arrival, used only while nothing else gets closer to the goal."""
+
+    def __init__(self, start: int) -> None:
+        self.expanded: dict[int, None] = {}
+        self._queues: tuple[list[_Entry], ...] = ([((0, 0), 0, start)], [], [])
+        self._priority = [0, 0, 0]
+        self._count = 0
+        self._best: int | None = None
+        self._progress = 0
+        self._seen: dict[int, int] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._queues[_ALL] or self._queues[_HELPFUL])
+
+    def pop(self) -> int:
+        """The next state; it may have been expanded before."""
+        idle = len(self.expanded) - self._progress
+        if idle == _STALLED:
+            self._priority[_NOVEL] = min(self._priority)
+        usable = [each for each in _QUEUES if self._queues[each] and (idle >= _STALLED or each != _NOVEL)]
+        which = min(usable, key=lambda number: self._priority[number])
+        self._priority[which] += 1
+        return heappop(self._queues[which])[-1]
+
+    def expand(self, state: int, steps: int) -> bool:
+        """A state is expanded; is something true in it that was not in others as far from the goal?"""
+        self.expanded[state] = None
+        if self._best is None or steps < self._best:
+            if self._best is not None:
+                self._priority[_HELPFUL] -= _BOOST
+            self._best, self._progress = steps, len(self.expanded)
+        seen = self._seen.get(steps, 0)
+        self._seen[steps] = seen | state
+        return bool(state & ~seen)
+
+    def push(self, state: int, rank: tuple[int, int], helpful: bool, novel: bool) -> None:
+        """One more state."""
+        self._count += 1
+        heappush(self._queues[_ALL], (rank, self._count, state))
+        if helpful:
+            heappush(self._queues[_HELPFUL], (rank, self._count, state))
+        if novel:
+            heappush(self._queues[_NOVEL], ((self._count, 0), self._count, state))
 
 
 def _traced(parent: dict[int, Taken | None], end: int) -> WeakPlan:
