@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import product
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -12,15 +14,20 @@ from bbtc.belief.chain import explore
 from bbtc.belief.simulate import figures, simulate
 from bbtc.belief.soundness import violations
 from bbtc.belief.state import compile_action, initial_belief
-from bbtc.ground.condition import evaluate
+from bbtc.belief.tick import STARTED, Status, compile_tick
+from bbtc.ground.condition import Is, Known, evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
+from bbtc.planner.mdp.packing import Packing
 from bbtc.planner.result import Plan
+from bbtc.planner.strong_cyclic.partial_state import PartialState, as_conditions, contains, united
 from bbtc.planner.strong_cyclic.quotient import quotient_chain
 from bbtc.planner.strong_cyclic.solve import Solver
+from bbtc.tree.nodes import actions_of
 from bbtc.tree.validate import check_tree
+from tests.ground.examples import task_of
 from tests.long_form import amount
 from tests.plan.strong_cyclic_reference import strong_cyclic_states
 from tests.strategies import tasks
@@ -88,7 +95,7 @@ def test_steps_are_those_of_the_simulator_and_regression_is_enough(of: Task, ran
                 everything = sum(model.packing.bits(v) for v in range(len(of.variables)))
                 reached = step.apply(state)
                 for mask in [everything, *(model.packing.bits(v) for v in range(len(of.variables)))]:
-                    wanted = type(model.actions[0].common)(mask, reached & mask)
+                    wanted = PartialState(mask, reached & mask)
                     needed = model.needed(action.number, step, state, wanted)
                     assert state & needed.mask == needed.value
                     for other in packed:
@@ -108,3 +115,113 @@ def test_the_quotient_of_a_chain_has_the_figures_of_the_chain(of: Task) -> None:
     assert violations(of, quotient) == []
     whole, small = figures(of, root, chain), figures(of, root, quotient)
     assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
+
+
+@settings(max_examples=amount(150, 5000), deadline=None, suppress_health_check=list(HealthCheck))
+@given(of=tasks(most_actions=5))
+def test_whatever_the_state_no_action_starts_without_its_precondition_and_success_means_the_goal(
+    of: Task,
+) -> None:
+    """In every assignment of values, reachable or not: others may bring it about."""
+    root = plan(of).tree.root
+    tick = compile_tick(of, root)
+    nodes = list(actions_of(root))
+    for values in product(*(sorted(variable.values) for variable in of.variables)):
+        status = tick(values, 0)
+        if status >= STARTED:
+            needed = of.action_by_name[nodes[status - STARTED].action].precondition
+            assert evaluate(needed, values) is Truth.TRUE
+        elif status == Status.SUCCESS:
+            assert evaluate(of.goal, values) is Truth.TRUE
+
+
+# --- regression --------------------------------------------------------------------------------
+
+
+def regressed(domain: str, start: str, step: str, wanted: str) -> str:
+    """What of a state, written as the facts that are true, is enough for an action to lead by one of its
+    outcomes to some facts (``-`` before those that are false, ``?`` before those that are unknown)."""
+    of = task_of(f"{domain}(define (problem p) (:domain d) (:init {start}) (:goal {GOAL}))")
+    solver = Solver(of, Limits())
+    model = solver.model
+    (state,) = solver.initial
+    want = PartialState(0, 0)
+    for word in wanted.split():
+        variable = of.variable_index[f"{word.lstrip('-?')}()"]
+        value = Truth.UNKNOWN if word[0] == "?" else Truth.FALSE if word[0] == "-" else Truth.TRUE
+        bits = model.packing.assigned(variable, value)
+        want = united(want, model.reasons.literal(variable, bits))
+    (number,) = [n for n, action in enumerate(of.actions) if action.schema == step]
+    found = {
+        text(of, model.needed(number, each, state, want), model.packing)
+        for each in model.actions[number].steps
+        if contains(want, each.apply(state))
+    }
+    return " | ".join(sorted(found))
+
+
+def text(of: Task, partial: PartialState, packing: Packing) -> str:
+    words = []
+    for condition in as_conditions(packing, partial):
+        match condition:
+            case Is(variable, value):
+                sign = {Truth.TRUE: "", Truth.FALSE: "-", Truth.UNKNOWN: "?"}[value]
+                words.append(f"{sign}{of.variables[variable].predicate}")
+            case Known(variable):
+                words.append(f"known:{of.variables[variable].predicate}")
+            case _:
+                raise AssertionError(condition)
+    return " ".join(words)
+
+
+GOAL = "(or (and (here) (there) (open)) (and (locked) (wet) (seen)))"
+
+DOMAIN = """
+(define (domain d)
+  (:predicates (here) (there) (open) (locked) (wet) (unknown (seen)))
+  (:action shuffle :effect (oneof
+    (and (here) (there) (open) (locked) (wet) (seen))
+    (and (not (here)) (not (there)) (not (open)) (not (locked)) (not (wet)) (not (seen)))))
+  (:action walk :precondition (and (here) (open))
+    :effect (and (not (here)) (there) (oneof (and) (wet))))
+  (:action enter :precondition (and (here) (or (open) (not (locked))))
+    :effect (and (there) (not (here))))
+  (:action push :precondition (here)
+    :effect (and (when (not (locked)) (open)) (when (wet) (not (open)))))
+  (:action look :precondition (unknown (seen))
+    :effect (and (oneof (seen) (not (seen)))))
+  (:action sway :precondition (here)
+    :effect (unknown (seen)))
+  (:action keep :precondition (here) :effect (when (locked) (unknown (seen)))))
+"""
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "wanted", "expected"),
+    [
+        # what an outcome sets is not needed before, what it leaves alone is
+        ("(here) (open)", "walk", "there wet", "here open"),
+        ("(here) (open) (wet)", "walk", "there wet", "here open | here open wet"),
+        ("(here) (open) (locked)", "walk", "there locked -wet", "here locked open -wet"),
+        # of a disjunction, the part that holds
+        ("(here) (open) (locked)", "enter", "there", "here open"),
+        ("(here)", "enter", "there", "here -locked"),
+        ("(here) (open)", "enter", "there open", "here open"),
+        # a conditional effect: why it happens, why another does not undo it
+        ("(here)", "push", "open", "here -locked"),
+        ("(here) (wet)", "push", "open", "here -locked"),
+        ("(here) (locked) (open)", "push", "open", "here open -wet"),
+        ("(here) (locked) (open) (wet)", "push", "-open", "here locked wet"),
+        ("(here) (locked)", "push", "-open", "here locked -open"),
+        ("(here) (locked)", "push", "here", "here"),
+        # observation and forgetting
+        ("(here) (unknown (seen))", "look", "seen here", "here ?seen"),
+        ("(here) (unknown (seen))", "look", "-seen", "?seen"),
+        ("(here) (seen)", "sway", "?seen", "here"),
+        ("(here) (seen)", "keep", "seen", "here -locked seen"),
+        ("(here) (seen) (locked)", "keep", "?seen", "here locked"),
+        ("(here) (unknown (seen)) (locked)", "keep", "?seen", "here locked"),
+    ],
+)
+def test_regression(start: str, step: str, wanted: str, expected: str) -> None:
+    assert regressed(DOMAIN, start, step, wanted) == expected

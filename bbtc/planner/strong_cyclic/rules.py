@@ -38,6 +38,7 @@ from bbtc.planner.strong_cyclic.partial_state import (
     contradict,
     entails,
     literals,
+    satisfied,
     united,
     without,
 )
@@ -82,7 +83,7 @@ class Rules:
         """Rules that decide alike in all states that were visited, with less in their guards, fewer of
         them."""
         rules = self._merged(self.plain())
-        undecided = [state for state in self.solved.visited if not self._in_goal(state)]
+        undecided = [state for state in self.solved.visited if not satisfied(self.model.goal, state)]
         found: list[Rule] = []
         actions = self._decisions(rules, undecided)
         for number, rule in enumerate(rules):
@@ -99,11 +100,6 @@ class Rules:
             if not undecided and number < len(rules):
                 break  # the rest decides nothing that is met
         return self._merged(found)
-
-    def _in_goal(self, state: int) -> bool:
-        from bbtc.planner.strong_cyclic.partial_state import satisfied
-
-        return satisfied(self.model.goal, state)
 
     def _guard(self, partial: PartialState, action: int) -> Guard:
         needs = self.model.actions[action].common
@@ -203,25 +199,16 @@ class Rules:
 
 def tree_of(task: Task, model: Determinised, rules: Sequence[Rule]) -> Node:
     """The rules as a tree."""
-    goal = _goal(task)
+    goal = ConditionNode("", certainly(task, task.goal))
     children: list[Node] = []
     for rule in rules:
         action = task.actions[rule.action]
         guard = _condition(task, model, rule)
         node: Node = ActionNode("", action.name, latched=False)
         if guard != TRUE:
-            tests: list[Node] = [ConditionNode("", part) for part in _parts(guard)]
-            node = ControlNode("", "sequence", (*tests, node))
+            node = ControlNode("", "sequence", (ConditionNode("", guard), node))
         children.append(node)
     return numbered(ControlNode("", "fallback", (goal, *children)) if children else goal)
-
-
-def _goal(task: Task) -> Node:
-    return ConditionNode("", certainly(task, task.goal))
-
-
-def _parts(guard: Condition) -> tuple[Condition, ...]:
-    return (guard,)
 
 
 def _condition(task: Task, model: Determinised, rule: Rule) -> Condition:
