@@ -1,8 +1,9 @@
 """From a policy to rules, and from rules to a tree: ``Fallback(goal, Sequence(guard, action)…)``.
 
-Rules are tried in the order of their distance to the goal. The guard of a rule holds what the action's
-precondition needs, what keeps the action from being forbidden, and of what the rest of the plan needs as
-much as tells the rule from others. Every guard is true or false in every state: unknown counts as false.
+Rules are tried in the order of their distance to the goal. Every action reads its precondition before it
+starts. Besides, the guard of a rule holds what keeps the action from being forbidden, and of what the rest of
+the plan needs as much as tells the rule from others. Nothing that is read is ever unknown: what might be is
+read as false then.
 """
 
 from __future__ import annotations
@@ -21,14 +22,13 @@ from bbtc.ground.condition import (
     Not,
     Or,
     conjunction,
-    conjuncts,
     disjunction,
     negation,
+    variables,
 )
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.planner.mdp.packing import bit_test, cubes
 from bbtc.planner.strong_cyclic.determinised import Determinised
 from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import (
@@ -49,7 +49,7 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Start ``action`` (its number in the task) where one of ``guards`` holds."""
+    """Start ``action`` (its number in the task) where its precondition and one of ``guards`` hold."""
 
     guards: tuple[Guard, ...]
     action: int
@@ -89,22 +89,23 @@ class Rules:
         for number, rule in enumerate(rules):
             self.limits.check_time("the search for a small tree")
             guards = list(rule.guards)
-            others = [state for state in undecided if actions[state] != rule.action]
+            test = self.model.actions[rule.action].test
+            others = [
+                state for state in undecided if actions[state] != rule.action and satisfied(test, state)
+            ]
             for at, guard in enumerate(guards):
                 guards[at] = self._shorter(guard, others)
             short = Rule(tuple(guards), rule.action)
             found.append(short)
-            undecided = [
-                state for state in undecided if not any(guard.holds(state) for guard in short.guards)
-            ]
+            undecided = [state for state in undecided if not self._applies(short, state)]
             if not undecided and number < len(rules):
                 break  # the rest decides nothing that is met
         return self._merged(found)
 
     def _guard(self, partial: PartialState, action: int) -> Guard:
-        needs = self.model.actions[action].common
-        kept = needs.mask
-        known = self.exclusion.closed(needs)
+        known = self.exclusion.closed(self.model.actions[action].common)
+        kept = 0
+        partial = without(partial, known.mask)
         excluded: list[PartialState] = []
         for each in self.solved.forbidden.of_action.get(action, ()):
             if contradict(each, known):
@@ -113,11 +114,10 @@ class Rules:
             if apart:  # it says already that this is not so
                 bits = apart & partial.value or apart
                 kept |= self._whole((bits & -bits).bit_length() - 1) & partial.mask
-                continue
-            if contradict(each, self.exclusion.closed(partial)):
+            elif contradict(each, self.exclusion.closed(united(known, partial))):
                 kept |= partial.mask
-                continue
-            excluded.append(without(each, known.mask))
+            else:
+                excluded.append(without(each, known.mask))
         alone = [each for each in excluded if self._opposite(each) is not None]
         for each in alone:
             opposite = self._opposite(each)
@@ -139,11 +139,13 @@ class Rules:
     def _decisions(self, rules: Sequence[Rule], states: Sequence[int]) -> dict[int, int]:
         """The action of each state, -1 where no rule applies."""
         return {
-            state: next(
-                (rule.action for rule in rules if any(guard.holds(state) for guard in rule.guards)), -1
-            )
-            for state in states
+            state: next((rule.action for rule in rules if self._applies(rule, state)), -1) for state in states
         }
+
+    def _applies(self, rule: Rule, state: int) -> bool:
+        return satisfied(self.model.actions[rule.action].test, state) and any(
+            guard.holds(state) for guard in rule.guards
+        )
 
     def _shorter(self, guard: Guard, others: list[int]) -> Guard:
         """Without what is not needed to hold in none of some states."""
@@ -176,11 +178,12 @@ class Rules:
         return found
 
     def _apart(self, one: Rule, other: Rule) -> bool:
-        return all(
-            contradict(self.exclusion.closed(guard.partial), self.exclusion.closed(each.partial))
-            for guard in one.guards
-            for each in other.guards
-        )
+        return all(contradict(own, its) for own in self._where(one) for its in self._where(other))
+
+    def _where(self, rule: Rule) -> list[PartialState]:
+        """What holds for sure where a rule applies, for each of its guards."""
+        needs = self.model.actions[rule.action].common
+        return [self.exclusion.closed(united(needs, guard.partial)) for guard in rule.guards]
 
     def _joined(self, guards: Sequence[Guard]) -> tuple[Guard, ...]:
         found: list[Guard] = []
@@ -199,46 +202,37 @@ class Rules:
 
 def tree_of(task: Task, model: Determinised, rules: Sequence[Rule]) -> Node:
     """The rules as a tree."""
-    goal = ConditionNode("", certainly(task, task.goal))
     children: list[Node] = []
     for rule in rules:
         action = task.actions[rule.action]
         guard = _condition(task, model, rule)
-        node: Node = ActionNode("", action.name, latched=False)
+        node: Node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
         if guard != TRUE:
             node = ControlNode("", "sequence", (ConditionNode("", guard), node))
         children.append(node)
+    goal = ConditionNode("", certainly(task, task.goal))
     return numbered(ControlNode("", "fallback", (goal, *children)) if children else goal)
 
 
 def _condition(task: Task, model: Determinised, rule: Rule) -> Condition:
-    """The guards of a rule and the precondition of its action, what they share first."""
+    """The guards of a rule, what they share first. A precondition that may be unknown is read here, too: the
+    action would wait for it."""
     shared = rule.guards[0].partial
     for guard in rule.guards[1:]:
         differ = shared.mask & guard.partial.mask & ~(shared.value ^ guard.partial.value)
-        common = [
-            literal for literal in literals(model.packing, shared) if literal.mask & differ == literal.mask
-        ]
+        common = [each for each in literals(model.packing, shared) if each.mask & differ == each.mask]
         shared = PartialState(sum(each.mask for each in common), sum(each.value for each in common))
     precondition = task.actions[rule.action].precondition
-    parts = list(_certain(task, model, shared))
-    parts.extend(_beyond(task, model, precondition, [guard.partial for guard in rule.guards]))
+    parts: list[Condition] = []
+    if any(task.variables[variable].three_valued for variable in variables(precondition)):
+        parts.append(certainly(task, precondition))
+    parts.extend(_certain(task, model, shared))
     ways = []
     for guard in rule.guards:
         own = list(_certain(task, model, without(guard.partial, shared.mask)))
         own.extend(disjunction(_certain(task, model, each, negated=True)) for each in guard.excluded)
         ways.append(conjunction(own))
     return conjunction([*parts, disjunction(ways)])
-
-
-def _beyond(
-    task: Task, model: Determinised, precondition: Condition, guards: Sequence[PartialState]
-) -> Iterator[Condition]:
-    """What of a precondition guards do not say."""
-    for part in conjuncts(precondition):
-        found = cubes(bit_test(model.packing, part), 32)
-        if found is None or not all(any(entails(guard, cube) for cube in found) for guard in guards):
-            yield certainly(task, part)
 
 
 def _certain(
