@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
@@ -15,18 +18,21 @@ from bbtc.belief.simulate import figures, simulate
 from bbtc.belief.soundness import violations
 from bbtc.belief.state import compile_action, initial_belief
 from bbtc.belief.tick import STARTED, Status, compile_tick
+from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import Is, Known, evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
 from bbtc.planner.mdp.packing import Packing
+from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.planner.strong_cyclic.partial_state import PartialState, as_conditions, contains, united
 from bbtc.planner.strong_cyclic.quotient import quotient_chain
 from bbtc.planner.strong_cyclic.solve import Solver
 from bbtc.tree.nodes import actions_of
 from bbtc.tree.validate import check_tree
+from tests.conftest import REPOSITORY
 from tests.ground.examples import task_of
 from tests.long_form import amount
 from tests.plan.strong_cyclic_reference import strong_cyclic_states
@@ -225,3 +231,93 @@ DOMAIN = """
 )
 def test_regression(start: str, step: str, wanted: str, expected: str) -> None:
     assert regressed(DOMAIN, start, step, wanted) == expected
+
+
+# --- larger tasks, and limits --------------------------------------------------------------------
+
+WALK = """
+(define (domain walk)
+  (:requirements :typing :probabilistic-effects :negative-preconditions)
+  (:types place)
+  (:predicates (at ?p - place) (next ?a ?b - place) (flat) (spare ?p - place))
+  (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (next ?a ?b) (not (flat)))
+    :effect (and (not (at ?a)) (at ?b) (probabilistic 1/2 (flat))))
+  (:action mend :parameters (?p - place) :precondition (and (at ?p) (flat) (spare ?p))
+    :effect (and (not (flat)) (not (spare ?p)))))
+"""
+
+
+def walk(length: int, bare: tuple[int, ...] = (), ways: tuple[tuple[int, int], ...] = ()) -> Task:
+    """Places in a row with a spare tire at each but the ``bare`` ones, and more ``ways`` from one to
+    another."""
+    names = " ".join(f"p{at}" for at in range(length))
+    steps = [*((at, at + 1) for at in range(length - 1)), *ways]
+    facts = [f"(next p{a} p{b})" for a, b in steps]
+    facts += [f"(spare p{at})" for at in range(length) if at not in bare]
+    return task_of(
+        f"{WALK}(define (problem p) (:domain walk) (:objects {names} - place)"
+        f" (:init (at p0) {' '.join(facts)}) (:goal (at p{length - 1})))"
+    )
+
+
+def test_a_tree_of_very_many_states_is_proven_and_its_cost_exact() -> None:
+    """Every place is left with or without its spare: 2^58 states differ in what no longer matters."""
+    done = plan(walk(60), Limits(states=20_000))
+    assert done.tree.status == "target-reached"
+    assert done.tree.bounds == (1, 1)
+    assert done.figures.success == 1
+    assert done.figures.cost == 59 + Fraction(58, 2)
+    assert done.figures.states < 1000
+    small = walk(8)
+    assert plan(small).figures.cost == 7 + Fraction(6, 2)
+
+
+def test_a_way_that_may_end_in_a_dead_end_is_not_taken() -> None:
+    """The short cut goes by a place without a spare tire."""
+    of = walk(12, bare=(5,), ways=((3, 5), (4, 6), (5, 11), (0, 5)))
+    done = plan(of)
+    assert done.tree.status == "target-reached"
+    assert not [node.action for node in actions_of(done.tree.root) if node.action.endswith("p5)")]
+    assert plan(walk(12, bare=(5,))).tree.status == "out-of-reach"
+
+
+def test_groups_of_exclusive_facts_are_found() -> None:
+    of = walk(5)
+    solver = Solver(of, Limits())
+    names = [[of.variables[variable].name for variable in group] for group in solver.exclusion.groups]
+    assert names == [[f"at(p{at})" for at in range(5)]]
+
+
+def test_limits_end_it_and_the_tree_so_far_is_kept() -> None:
+    done = plan(walk(30), Limits(states=10))
+    assert done.tree.status == "limit-reached"
+    assert done.stop is not None
+    assert "states" in done.stop.message
+    done = plan(walk(200), Limits(seconds=0.05))
+    assert done.tree.status in {"limit-reached", "target-reached"}
+
+
+def test_a_number_of_actions_is_refused() -> None:
+    with pytest.raises(BbtcError) as caught:
+        plan_task(
+            walk(3), Fraction(1), "strong-cyclic", Limits(), lambda _: None, options=Options(max_actions=3)
+        )
+    assert caught.value.diagnostics[0].code == "BBT0503"
+
+
+def test_trees_do_not_depend_on_the_seed_of_hashes() -> None:
+    program = (
+        "from tests.plan.test_strong_cyclic import plan, walk\n"
+        "print(plan(walk(9, bare=(5,), ways=((3, 5), (4, 6), (2, 8), (0, 3)))).tree.root)\n"
+    )
+    printed = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "PYTHONHASHSEED": str(seed)},
+            capture_output=True,
+            check=True,
+            cwd=REPOSITORY,
+        ).stdout
+        for seed in (1, 2, 3)
+    }
+    assert len(printed) == 1

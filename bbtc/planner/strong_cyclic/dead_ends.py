@@ -100,6 +100,7 @@ class DeadEnds:
 
     def _generalised(self, exhausted: Exhausted) -> dict[int, PartialState]:
         """For states of an exhausted search, enough for the search to find nothing."""
+        limits = self.relaxation.limits
         model, seen = self.model, exhausted.seen
         if len(seen) * len(model.actions) > _MOST_WORK:
             full = sum(model.packing.bits(variable) for variable in range(len(model.packing.unknown)))
@@ -111,6 +112,7 @@ class DeadEnds:
         while moved:
             moved = False
             for state in reversed(seen):
+                limits.check_time("the search for a policy")
                 found = why[state]
                 for number in model.applicable(state):
                     if self.forbidden.forbids(state, number) is None:

@@ -118,6 +118,7 @@ class Visit:
     def _enter(self, state: int) -> Node:
         limits = self.decisions.limits
         limits.check_states(len(self.nodes), "the search for a policy")
+        limits.check_time("the search for a policy", len(self.nodes))
         node = self.nodes[state] = Node(state, len(self.nodes), len(self.nodes))
         self._stack.append(node)
         node.why = node.why_final = self.decisions.final(state)
