@@ -150,9 +150,12 @@ def main() -> int:
     parser.add_argument("--strategy", help="how to plan; default: bbtc's own")
     options = parser.parse_args()
     folder = corpus_folder()
-    peers = options.peers or (folder and folder.parent / "planning" / "coverage.tsv")
-    if folder is None or not peers.is_file():
-        print("needs the corpus, and the table of what the peers needed")
+    if folder is None:
+        print("needs the corpus")
+        return 2
+    peers: Path = options.peers or folder.parent / "planning" / "coverage.tsv"
+    if not peers.is_file():
+        print("needs the table of what the peers needed: --peers")
         return 2
     with peers.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file, delimiter="\t"))

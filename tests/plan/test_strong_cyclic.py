@@ -264,7 +264,7 @@ def test_a_tree_of_very_many_states_is_proven_and_its_cost_exact() -> None:
     """Every place is left with or without its spare: 2^58 states differ in what no longer matters."""
     done = plan(walk(60), Limits(states=20_000))
     assert done.tree.status == "target-reached"
-    assert done.tree.bounds == (1, 1)
+    assert done.tree.bounds == (Fraction(1), Fraction(1))
     assert done.figures.success == 1
     assert done.figures.cost == 59 + Fraction(58, 2)
     assert done.figures.states < 1000

@@ -56,7 +56,12 @@ STATUS_EXIT: dict[Status, int] = {
 @click.option(
     "--target", type=Probability(), help="Wanted success probability; default: the problem's, else 1."
 )
-@click.option("--strategy", default=DEFAULT, show_default=True, help="Or auto, search, policy, refine.")
+@click.option(
+    "--strategy",
+    default=DEFAULT,
+    show_default=True,
+    help="Or auto, search, policy, strong-cyclic, refine.",
+)
 @click.option("--max-actions", type=Count(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",
