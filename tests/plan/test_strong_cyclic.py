@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from fractions import Fraction
 from itertools import product
+from random import Random
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -321,3 +322,19 @@ def test_trees_do_not_depend_on_the_seed_of_hashes() -> None:
         for seed in (1, 2, 3)
     }
     assert len(printed) == 1
+
+
+@pytest.mark.parametrize("seed", range(amount(60, 2000)))
+def test_random_walks_are_taken_where_enumeration_finds_a_sure_way(seed: int) -> None:
+    """Loops, dead ends that depend on what was used up, ways around them."""
+    random = Random(seed)
+    length = random.randint(5, 8)
+    bare = tuple(sorted(random.sample(range(length - 1), random.randint(1, length - 2))))
+    drawn = {(random.randrange(length), random.randrange(length)) for _ in range(random.randint(2, 8))}
+    try:
+        of = walk(length, bare, tuple(sorted((a, b) for a, b in drawn if a != b)))
+    except BbtcError:
+        return  # the goal cannot be reached at all, and grounding says so
+    _, safe = strong_cyclic_states(of)
+    expected = "target-reached" if set(initial_belief(of)) <= safe else "out-of-reach"
+    assert plan(of).tree.status == expected

@@ -181,6 +181,7 @@ class Solver:
                 against.append(other.partial)
                 continue
             reason = self.forbidden.forbids(state, other.action)
-            assert reason is not None
-            found = united(found, reason)
+            if reason is not None:
+                found = united(found, reason)
+            # Else it was added since the state was decided: this round is not the last one.
         return self.exclusion.refuting(self.model.reasons, against, state, found)
