@@ -28,16 +28,16 @@ from bbtc.pipeline import plan_task
 from bbtc.planner.mdp.packing import Packing
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
-from bbtc.planner.strong_cyclic.partial_state import PartialState, as_conditions, contains, united
+from bbtc.planner.strong_cyclic.partial_state import PartialState, as_conditions, contains, satisfied, united
 from bbtc.planner.strong_cyclic.quotient import quotient_chain
-from bbtc.planner.strong_cyclic.solve import Solver
-from bbtc.tree.nodes import actions_of
+from bbtc.planner.strong_cyclic.solve import Solved, Solver
+from bbtc.tree.nodes import ActionNode, ControlNode, Node, actions_of
 from bbtc.tree.validate import check_tree
 from tests.conftest import REPOSITORY
 from tests.ground.examples import task_of
 from tests.long_form import amount
 from tests.plan.strong_cyclic_reference import strong_cyclic_states
-from tests.strategies import tasks
+from tests.strategies import nodes, tasks
 
 
 def plan(of: Task, limits: Limits | None = None) -> Plan:
@@ -124,6 +124,56 @@ def test_the_quotient_of_a_chain_has_the_figures_of_the_chain(of: Task) -> None:
     assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
 
 
+@settings(max_examples=amount(200, 5000), deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_the_quotient_of_any_tree_without_memory_has_the_figures_of_its_chain(data: st.DataObject) -> None:
+    """Trees that read what is unknown, too, with guarded actions and loops."""
+    of = data.draw(tasks(most_actions=4))
+    root = forgetful(data.draw(nodes(of, depth=4)))
+    solver = Solver(of, Limits())
+    chain = explore(of, root, Limits())
+    quotient = quotient_chain(of, root, Limits(), solver.model, solver.exclusion)
+    whole, small = figures(of, root, chain), figures(of, root, quotient)
+    assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
+
+
+def forgetful(node: Node) -> Node:
+    """The tree without latches and retry nodes, its actions guarded."""
+    match node:
+        case ActionNode():
+            return replace(node, latched=False, guarded=True)
+        case ControlNode(kind="retry"):
+            return forgetful(node.children[0])
+        case ControlNode():
+            return replace(node, children=tuple(map(forgetful, node.children)))
+        case _:
+            return node
+
+
+@pytest.mark.parametrize("seed", range(amount(40, 1000)))
+def test_a_policy_that_is_proven_leads_on_from_every_state_it_leads_to(seed: int) -> None:
+    """By enumeration of the states that it leads to, those not visited for the proof among them."""
+    random = Random(seed)
+    length = random.randint(6, 9)
+    drawn = {(random.randrange(length), random.randrange(length)) for _ in range(random.randint(2, 6))}
+    of = walk(length, (), tuple(sorted((a, b) for a, b in drawn if a != b)))
+    solver = Solver(of, Limits())
+    assert isinstance(solver.run(), Solved)
+    states = list(solver.initial)
+    edges: dict[int, set[int]] = {}
+    for state in states:
+        if state in edges or satisfied(solver.model.goal, state):
+            continue
+        pair = solver.policy.decide(state)
+        assert pair is not None
+        edges[state] = {each.apply(state) for each in solver.model.actions[solver.action(pair)].steps}
+        states.extend(edges[state])
+    surely = set(states) - set(edges)
+    while more := {state for state, after in edges.items() if state not in surely and after & surely}:
+        surely |= more
+    assert surely == set(states)
+
+
 @settings(max_examples=amount(150, 5000), deadline=None, suppress_health_check=list(HealthCheck))
 @given(of=tasks(most_actions=5))
 def test_whatever_the_state_no_action_starts_without_its_precondition_and_success_means_the_goal(
@@ -132,11 +182,11 @@ def test_whatever_the_state_no_action_starts_without_its_precondition_and_succes
     """In every assignment of values, reachable or not: others may bring it about."""
     root = plan(of).tree.root
     tick = compile_tick(of, root)
-    nodes = list(actions_of(root))
+    actions = list(actions_of(root))
     for values in product(*(sorted(variable.values) for variable in of.variables)):
         status = tick(values, 0)
         if status >= STARTED:
-            needed = of.action_by_name[nodes[status - STARTED].action].precondition
+            needed = of.action_by_name[actions[status - STARTED].action].precondition
             assert evaluate(needed, values) is Truth.TRUE
         elif status == Status.SUCCESS:
             assert evaluate(of.goal, values) is Truth.TRUE
