@@ -150,7 +150,7 @@ def plan(
     """Plan a tree that reaches the goal with the target probability (default: the problem's own).
 
     Without ``limits``, planning takes a minute at most. ``strategy`` is ``advised`` (the default),
-    ``auto``, ``search``, ``policy`` or ``refine``;
+    ``auto``, ``search``, ``policy``, ``strong-cyclic`` or ``refine``;
     ``max_actions`` bounds the actions of every run; ``guarded`` trees check preconditions and the goal in
     worlds that others change, too; ``problem`` and ``lenient`` as in :func:`load`; ``progress`` is told
     each refinement as it is made.

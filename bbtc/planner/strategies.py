@@ -45,6 +45,7 @@ STRATEGIES = {
     "refine": Entry("bbtc.planner.chaining.refine", "refine"),
     "search": Entry("bbtc.planner.chaining.search", "plan_search", retries=True),
     "policy": Entry("bbtc.planner.synthesis.policy", "plan_policy", max_actions=True, retries=True),
+    "strong-cyclic": Entry("bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic"),
     "auto": Entry("bbtc.planner.auto", "plan_auto", max_actions=True, retries=True),
     "advised": Entry("bbtc.planner.auto", "plan_advised", max_actions=True, retries=True),
 }

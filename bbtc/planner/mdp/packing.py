@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
@@ -36,6 +36,11 @@ class Packing:
 
     unknown: tuple[int | None, ...]
     words: int
+    _three_valued: tuple[int, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        three_valued = tuple(v for v, at in enumerate(self.unknown) if at is not None)
+        object.__setattr__(self, "_three_valued", three_valued)
 
     @classmethod
     def of(cls, task: Task) -> Packing:
@@ -46,6 +51,11 @@ class Packing:
             unknown.append(at if variable.three_valued else None)
             at += variable.three_valued
         return cls(tuple(unknown), max(1, -(-at // WORD)))
+
+    def owner(self, bit: int) -> int:
+        """The variable that a bit belongs to."""
+        count = len(self.unknown)
+        return bit if bit < count else self._three_valued[bit - count]
 
     def bits(self, variable: int) -> int:
         """All bits of a variable."""

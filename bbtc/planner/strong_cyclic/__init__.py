@@ -1,0 +1,1 @@
+"""Strong cyclic policies over partial states: weak plans, regression, dead ends, rules."""

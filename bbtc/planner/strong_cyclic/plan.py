@@ -1,0 +1,81 @@
+"""The strategy ``strong-cyclic``: a policy over partial states that reaches the goal with probability 1,
+written down as rules; where there is none, it says so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+from bbtc.belief.chain import Chain, explore
+from bbtc.belief.simulate import success_of
+from bbtc.diagnostics import Diagnostic, LimitReached
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.planner.best_tree import BestTree
+from bbtc.planner.options import DEFAULTS, Options
+from bbtc.planner.result import Plan, Progress
+from bbtc.planner.strong_cyclic.quotient import quotient_chain
+from bbtc.planner.strong_cyclic.rules import Rule, Rules, tree_of
+from bbtc.planner.strong_cyclic.solve import Hopeless, Solved, Solver
+from bbtc.rewrite.simplify import numbered, size
+from bbtc.tree.nodes import ConditionNode, Node, PlanStatus
+
+_FEW_STATES = 2_000
+"""A tree with so many states is simulated in all of them; one with more, in as many as differ in what
+matters."""
+
+
+def plan_strong_cyclic(
+    task: Task,
+    target: Fraction,
+    limits: Limits,
+    progress: Progress,  # noqa: ARG001
+    options: Options = DEFAULTS,
+) -> Plan:
+    """Plan for probability 1. Always returns: where there is no such policy, or a limit is reached, with a
+    tree that only reads the goal."""
+    goal: Node = numbered(ConditionNode("", task.goal))
+    best = BestTree.start(task, target, options.best, goal, limits)
+    status: PlanStatus = "stuck"
+    stop: Diagnostic | None = None
+    try:
+        solver = Solver(task, limits)
+        match solver.run():
+            case Solved() as solved:
+                _keep(best, solver, solved, limits)
+            case Hopeless():
+                status = "out-of-reach" if target == 1 else "stuck"
+    except LimitReached as reached:
+        status, stop = "limit-reached", reached.diagnostics[0]
+    except KeyboardInterrupt:
+        status = "interrupted"
+    plan = best.plan(status, stop)
+    if plan.figures.success == 1:
+        plan = replace(plan, tree=replace(plan.tree, bounds=(Fraction(1), Fraction(1))))
+    return plan
+
+
+def _keep(best: BestTree, solver: Solver, solved: Solved, limits: Limits) -> None:
+    """The smallest tree of the policy that is shown to succeed always."""
+    rules = Rules(solver.model, solver.exclusion, solved, limits)
+    _keep_if_sure(best, solver, rules.plain(), limits)
+    _keep_if_sure(best, solver, rules.short(), limits)
+
+
+def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits: Limits) -> None:
+    root = tree_of(solver.task, solver.model, rules)
+    limits.check_nodes(size(root))
+    chain = chain_of(solver, root, limits)
+    success = success_of(chain)
+    if success == 1:
+        best.take(root, chain, success)
+
+
+def chain_of(solver: Solver, root: Node, limits: Limits) -> Chain:
+    """The chain of a tree, or where it is large, its quotient."""
+    try:
+        return explore(solver.task, root, replace(limits, states=min(limits.states, _FEW_STATES)))
+    except LimitReached:
+        limits.check_time("the simulation")
+    return quotient_chain(solver.task, root, limits, solver.model, solver.exclusion)

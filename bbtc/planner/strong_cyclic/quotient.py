@@ -1,0 +1,205 @@
+"""The chain of a tree with states that are alike in all that matters taken for one.
+
+What a tick reads of a state is enough for the same action to be started; what of a state is enough for the
+whole run to go the same way is an explanation of it (:mod:`bbtc.planner.strong_cyclic.visit`). States with
+the explanation of another one have runs of the same actions, outcomes, costs and ends, with the same
+probabilities: the chain over visited states is a quotient of the whole chain by a probabilistic
+bisimulation (Larsen, Skou, "Bisimulation through probabilistic testing", 1991), and its figures are those
+of the tree. All of it counts on invariants of reachable states only
+(:mod:`bbtc.planner.strong_cyclic.exclusion`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+from typing_extensions import assert_never
+
+from bbtc.belief.chain import Chain, Edge
+from bbtc.belief.state import State, Values, compile_action, initial_belief
+from bbtc.belief.tick import STARTED, NodeStatus
+from bbtc.ground.condition import Condition
+from bbtc.ground.task import Task, charges_of
+from bbtc.limits import Limits
+from bbtc.planner.mdp.packing import bit_test
+from bbtc.planner.strong_cyclic.determinised import Determinised, Step
+from bbtc.planner.strong_cyclic.exclusion import Exclusion
+from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, satisfied, united
+from bbtc.planner.strong_cyclic.visit import Visit
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, walk
+
+
+def quotient_chain(
+    task: Task, root: Node, limits: Limits, model: Determinised, exclusion: Exclusion
+) -> Chain:
+    """The quotient of the chain of a tree that remembers nothing. Raises ``LimitReached``; ``ValueError``
+    for a tree with latched actions or retry nodes."""
+    if any(action.latched for action in actions_of(root)) or any(
+        isinstance(node, ControlNode) and node.kind == "retry" for node in walk(root)
+    ):
+        raise ValueError("a tree that remembers what it did")
+    ticks = _Ticks(task, root, limits, model, exclusion)
+    visit = Visit(ticks)
+    packing = model.packing
+    belief = {packing.pack(values): p for values, p in initial_belief(task).items()}
+    for state in belief:
+        visit.all_from(state)
+    number = {state: index for index, state in enumerate(visit.nodes)}
+    transitions = [compile_action(task.action_by_name[node.action], limits) for node in ticks.nodes]
+
+    def edges_of(values: Values, choice: int) -> tuple[Edge, ...]:
+        return tuple(
+            Edge(result, number[visit.representative(packing.pack(result.values))])
+            for result in transitions[choice](values)
+        )
+
+    states = [State(_values(packing.unknown, state), 0) for state in visit.nodes]
+    started = [-1 if node.why_final is not None else node.choice for node in visit.nodes.values()]
+    status = [
+        NodeStatus.RUNNING if action >= 0 else NodeStatus(ticks.tick(state)[0])
+        for state, action in zip(visit.nodes, started, strict=True)
+    ]
+    return Chain(
+        tuple(ticks.nodes),
+        tuple(states),
+        tuple(status),
+        tuple(started),
+        tuple(
+            edges_of(state.values, action) if action >= 0 else ()
+            for state, action in zip(states, started, strict=True)
+        ),
+        tuple((p, number[visit.representative(state)]) for state, p in belief.items()),
+    )
+
+
+def _values(unknown: tuple[int | None, ...], state: int) -> Values:
+    return bytes(
+        1 if at is not None and state >> at & 1 else 2 * (state >> variable & 1)
+        for variable, at in enumerate(unknown)
+    )
+
+
+class _Known:
+    """What was read of a state so far, and what follows from it."""
+
+    __slots__ = ("_exclusion", "closed", "read")
+
+    def __init__(self, exclusion: Exclusion) -> None:
+        self._exclusion = exclusion
+        self.read = self.closed = ANY_STATE
+
+    def note(self, partial: PartialState) -> None:
+        if partial.mask & ~self.closed.mask:
+            self.read = united(self.read, partial)
+            self.closed = self._exclusion.closed(self.read)
+
+
+_Tick: TypeAlias = Callable[[int, _Known], int]
+
+
+class _Ticks:
+    """A tree as decisions, with what is read of a state for each."""
+
+    def __init__(
+        self, task: Task, root: Node, limits: Limits, model: Determinised, exclusion: Exclusion
+    ) -> None:
+        self.task, self.limits, self.model, self.exclusion = task, limits, model, exclusion
+        self.nodes = list(actions_of(root))
+        self._order = {node.id: index for index, node in enumerate(self.nodes)}
+        self._numbers = {action.name: number for number, action in enumerate(task.actions)}
+        self._root = self._compiled(root)
+        self._last: tuple[int, int, PartialState] = (-1, 0, ANY_STATE)
+
+    # --- decisions ----------------------------------------------------------------------------
+
+    def tick(self, state: int) -> tuple[int, PartialState]:
+        """What the root returns, or ``STARTED`` and more, and what was read."""
+        if self._last[0] != state:
+            known = _Known(self.exclusion)
+            self._last = state, self._root(state, known), known.read
+        return self._last[1:]
+
+    def final(self, state: int) -> PartialState | None:
+        """What was read, where no action is started."""
+        status, read = self.tick(state)
+        return read if status < STARTED else None
+
+    def decide(self, state: int) -> int:
+        """The number of the action node that is started."""
+        return self.tick(state)[0] - STARTED
+
+    def action(self, choice: int) -> int:
+        """The number of its action."""
+        return self._numbers[self.nodes[choice].action]
+
+    def why(self, state: int, choice: int) -> PartialState:
+        """What was read, and what the costs depend on."""
+        found = self.tick(state)[1]
+        action = self.task.actions[self.action(choice)]
+        for charge in charges_of(action.factors):
+            test = bit_test(self.model.packing, charge.when)
+            reasons = self.model.reasons
+            how = reasons.why if satisfied(test, state) else reasons.why_not
+            found = united(found, how(test, state, found.mask))
+        return found
+
+    def blame(self, state: int, choice: int, step: Step, dead: int) -> None:
+        """Trees have no dead ends: where nothing is started is final."""
+        raise AssertionError(f"state {dead} after {state} by {choice}, {step} is a dead end")
+
+    # --- ticks that take notes ------------------------------------------------------------------
+
+    def _compiled(self, node: Node) -> _Tick:
+        match node:
+            case ConditionNode():
+                return self._condition(node.condition)
+            case ActionNode():
+                started = STARTED + self._order[node.id]
+                if not node.guarded:
+                    return lambda _state, _known: started
+                guard = self._condition(self.task.action_by_name[node.action].precondition)
+
+                def guarded(state: int, known: _Known) -> int:
+                    holds = guard(state, known)
+                    return started if holds == NodeStatus.SUCCESS else holds
+
+                return guarded
+            case ControlNode():
+                children = [self._compiled(child) for child in node.children]
+                if node.kind == "retry":
+                    raise ValueError("a tree that remembers what it did")
+                go_on = {
+                    "sequence": NodeStatus.SUCCESS,
+                    "fallback": NodeStatus.FAILURE,
+                    "skipper": NodeStatus.RUNNING,
+                }[node.kind]
+
+                def control(state: int, known: _Known) -> int:
+                    for child in children:
+                        status = child(state, known)
+                        if status != go_on:
+                            return status
+                    return int(go_on)
+
+                return control
+            case _:
+                assert_never(node)
+
+    def _condition(self, condition: Condition) -> _Tick:
+        packing, reasons = self.model.packing, self.model.reasons
+        true, false = bit_test(packing, condition), bit_test(packing, condition, False)
+
+        def read(state: int, known: _Known) -> int:
+            closed = known.closed
+            if satisfied(true, state):
+                known.note(reasons.why(true, state, closed.mask))
+                return int(NodeStatus.SUCCESS)
+            if satisfied(false, state):
+                known.note(reasons.why(false, state, closed.mask))
+                return int(NodeStatus.FAILURE)
+            known.note(reasons.why_not(true, state, closed.mask))
+            known.note(reasons.why_not(false, state, known.closed.mask))
+            return int(NodeStatus.RUNNING)
+
+        return read

@@ -1,0 +1,321 @@
+"""The delete relaxation of a determinised task: how far the goal is, what helps, what is a dead end.
+
+Costs are those of the additive heuristic, from which a relaxed plan is read off (Hoffmann, Nebel, "The FF
+planning system", 2001; Keyder, Geffner, "Heuristics for planning with action costs revisited", 2008). A
+variable takes a value, unknown among them, as a fact of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from heapq import heappop, heappush
+
+from bbtc.limits import Limits
+from bbtc.planner.mdp.packing import ALWAYS, BitTest, cubes, set_bits
+from bbtc.planner.strong_cyclic.determinised import Determinised
+from bbtc.planner.strong_cyclic.exclusion import Exclusion
+from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, literals, united, without
+
+_NEVER = 1 << 60
+_MOST_CUBES = 32  # disjuncts of one condition; with more, it counts as true
+_MOST_WAYS = 64  # ways not to be where an action is forbidden; with more, it counts as allowed
+_FEW_EXCLUDED = 2
+_OPPOSITE_OF_TWO = {0: (2,), 2: (0,)}
+_OPPOSITE_OF_THREE = {0: (1, 2), 1: (3,), 2: (0, 1), 3: (1,)}
+_OPERATORS_AT_ONCE = 1024  # between two looks at the limits
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """``steps`` of a relaxed plan, and the actions of it that may start at once."""
+
+    steps: int
+    helpful: tuple[int, ...]
+
+
+class Relaxation:
+    """The relaxation, indexed once and asked for many states. Facts are numbered: variable v is false (4 v),
+    unknown, true, or known; then the goal, and what always holds."""
+
+    def __init__(self, model: Determinised, exclusion: Exclusion, limits: Limits) -> None:
+        self.model, self.exclusion, self.limits = model, exclusion, limits
+        self.packing = model.packing
+        self.count = 4 * len(self.packing.unknown) + 2
+        self.goal = self.count - 2
+        self._always = self.count - 1
+        self._full = self._two_valued = 0
+        for variable, at in enumerate(self.packing.unknown):
+            self._full |= self.packing.bits(variable)
+            self._two_valued |= 0 if at is not None else 1 << variable
+        self._build()
+
+    # --- operators ------------------------------------------------------------------------------
+
+    def _build(self) -> None:
+        self._action: list[int] = []
+        self._needs: list[tuple[int, ...]] = []
+        self._adds: list[tuple[int, ...]] = []
+        known = {3 + 4 * v for v, at in enumerate(self.packing.unknown) if at is not None}
+        made: dict[tuple[tuple[int, ...], tuple[int, ...], int], None] = {}
+        for needs in self._facts_of(self.model.goal, ANY_STATE):
+            made[needs, (self.goal,), -1] = None
+        for action in self.model.actions:
+            if action.number % _OPERATORS_AT_ONCE == 0:
+                self.limits.check_time("planning")
+            disjuncts = (ANY_STATE,) if action.needs is None else action.needs
+            for need in disjuncts:
+                for step in action.steps:
+                    for when, sets in [(part.when, part.sets) for part in step.guarded] or [
+                        (ALWAYS, step.sets)
+                    ]:
+                        adds = tuple(self._added(sets, known))
+                        for needs in self._facts_of(when, need):
+                            made[needs, adds, action.number] = None
+        self._users: list[list[int]] = [[] for _ in range(self.count)]
+        self._counts: list[int] = []
+        self._operators: dict[int, list[int]] = {}
+        self._unwanted: dict[int, list[int]] = {}
+        self._wanted = bytearray(self.count)
+        self._masks = [0, 0, 0, 0]
+        self._choices: dict[tuple[int, ...], int] = {}
+        for needs, adds, number in made:
+            self._operate(needs, adds, number)
+        self._want(self.goal)
+
+    def _operate(self, needs: tuple[int, ...], adds: tuple[int, ...], action: int) -> None:
+        """One more operator; what it adds counts where something needs it."""
+        operator = len(self._needs)
+        self._needs.append(needs)
+        self._counts.append(len(needs))
+        self._action.append(action)
+        self._operators.setdefault(action, []).append(operator)
+        self._adds.append(tuple(fact for fact in adds if self._wanted[fact]))
+        for fact in adds:
+            if not self._wanted[fact]:
+                self._unwanted.setdefault(fact, []).append(operator)
+        for fact in needs:
+            self._users[fact].append(operator)
+            self._want(fact)
+
+    def _want(self, fact: int) -> None:
+        """From now on a fact matters."""
+        if self._wanted[fact]:
+            return
+        self._wanted[fact] = 1
+        if fact < self.goal:
+            self._masks[fact % 4] |= 1 << fact // 4
+        for operator in self._unwanted.pop(fact, ()):
+            self._adds[operator] = (*self._adds[operator], fact)
+
+    def _facts_of(self, test: BitTest, also: PartialState) -> Iterator[tuple[int, ...]]:
+        found = cubes(test, _MOST_CUBES)
+        for cube in [ANY_STATE] if found is None else found:
+            if not (cube.value ^ also.value) & cube.mask & also.mask:
+                yield tuple(self._facts(united(cube, also))) or (self._always,)
+
+    def _facts(self, partial: PartialState) -> Iterator[int]:
+        for literal in literals(self.packing, partial):
+            variable = self.packing.owner((literal.mask & -literal.mask).bit_length() - 1)
+            unknown = self.packing.unknown[variable]
+            if literal.mask >> variable & 1:
+                yield 4 * variable + (2 if literal.value >> variable & 1 else 0)
+            else:
+                assert unknown is not None
+                yield 4 * variable + (1 if literal.value >> unknown & 1 else 3)
+
+    @staticmethod
+    def _added(sets: Iterable[tuple[int, int]], known: set[int]) -> Iterator[int]:
+        for variable, value in sets:
+            yield 4 * variable + int(value)
+            if value != 1 and 4 * variable + 3 in known:
+                yield 4 * variable + 3
+
+    def forbid(self, action: int, partial: PartialState) -> None:
+        """The action must not start where something holds: one of its literals must not hold."""
+        if not partial.mask:
+            for operator in self._operators.pop(action, ()):
+                self._counts[operator] += 1  # which nothing counts down
+            return
+        ways = tuple(fact for literal in literals(self.packing, partial) for fact in self._opposites(literal))
+        if len(ways) > _MOST_WAYS:
+            return
+        fact = ways[0] if len(ways) == 1 else self._choice(ways)
+        self._want(fact)
+        for operator in self._operators.get(action, ()):
+            if fact not in self._needs[operator]:
+                self._needs[operator] = (*self._needs[operator], fact)
+                self._users[fact].append(operator)
+                self._counts[operator] += 1
+
+    def _opposites(self, literal: PartialState) -> Iterator[int]:
+        """The facts of which one holds where a literal does not."""
+        (fact,) = self._facts(literal)
+        two_valued = self.packing.unknown[fact // 4] is None
+        for value in (_OPPOSITE_OF_TWO if two_valued else _OPPOSITE_OF_THREE)[fact % 4]:
+            yield fact - fact % 4 + value
+
+    def _choice(self, ways: tuple[int, ...]) -> int:
+        """A fact that takes one of some others."""
+        known = self._choices.get(ways)
+        if known is None:
+            known = self._choices[ways] = self.count
+            self.count += 1
+            self._users.append([])
+            self._wanted.append(1)
+            for way in ways:
+                self._operate((way,), (known,), -1)
+        return known
+
+    def holding(self, state: int) -> list[int]:
+        """The facts of a state that matter."""
+        count = len(self.packing.unknown)
+        unknown = 0
+        for variable, at in enumerate(self.packing.unknown):
+            if at is not None and state >> at & 1:
+                unknown |= 1 << variable
+        everything = (1 << count) - 1
+        true = state & everything & ~unknown
+        false = everything & ~true & ~unknown
+        found = [4 * variable + 2 for variable in set_bits(true & self._masks[2])]
+        found.extend(4 * variable for variable in set_bits(false & self._masks[0]))
+        found.extend(4 * variable + 1 for variable in set_bits(unknown & self._masks[1]))
+        found.extend(4 * variable + 3 for variable in set_bits(~unknown & everything & self._masks[3]))
+        return found
+
+    # --- the heuristic ----------------------------------------------------------------------------
+
+    def estimate(self, state: int) -> Estimate | None:
+        """A guess of the steps to the goal; None if it is out of reach, even in the relaxation."""
+        cost = [_NEVER] * self.count
+        by = [-1] * self.count
+        left = self._counts.copy()
+        total = [0] * len(left)
+        queue: list[int] = []
+        size = self.count
+        holding = [*self.holding(state), self._always]
+        for fact in holding:
+            cost[fact] = 0
+            queue.append(fact)
+        users, adds, actions, goal = self._users, self._adds, self._action, self.goal
+        while queue:
+            entry = heappop(queue)
+            spent, fact = divmod(entry, size)
+            if spent > cost[fact]:
+                continue
+            if fact == goal:
+                return self._relaxed_plan(by, cost)
+            for operator in users[fact]:
+                left[operator] -= 1
+                total[operator] += spent
+                if not left[operator]:
+                    price = total[operator] + (actions[operator] >= 0)
+                    for added in adds[operator]:
+                        if price < cost[added]:
+                            cost[added] = price
+                            by[added] = operator
+                            heappush(queue, price * size + added)
+        return None
+
+    def _relaxed_plan(self, by: list[int], cost: list[int]) -> Estimate:
+        chosen: set[tuple[int, tuple[int, ...]]] = set()
+        helpful: set[int] = set()
+        seen = {self.goal}
+        stack = [self.goal]
+        while stack:
+            operator = by[stack.pop()]
+            if operator < 0:
+                continue
+            needs = self._needs[operator]
+            action = self._action[operator]
+            if action >= 0:
+                chosen.add((action, needs))
+                if all(cost[fact] == 0 for fact in needs):
+                    helpful.add(action)
+            for fact in needs:
+                if fact not in seen:
+                    seen.add(fact)
+                    stack.append(fact)
+        return Estimate(len(chosen), tuple(sorted(helpful)))
+
+    # --- dead ends ----------------------------------------------------------------------------------
+
+    def generalised(self, state: int) -> PartialState:
+        """Enough for the goal to be out of reach in the relaxation, of a state where it is: no literal of it
+        can be left out."""
+        reach = _Reach(self._users, self._adds, self._counts, self.goal)
+        assert reach.add([*self.holding(state), self._always])
+        kept = self.exclusion.shortest(PartialState(self._full, state & self._full))
+        # What would be true without them, and makes no difference.
+        kept = without(kept, ~state & self._two_valued & ~self._masks[2])
+        for literal in sorted(literals(self.packing, kept), key=lambda each: each.value != 0):
+            kept = self._freed(reach, kept, literal)
+        return kept
+
+    def _freed(self, reach: _Reach, kept: PartialState, literal: PartialState) -> PartialState:
+        """A partial state without a literal of it, if the goal stays out of reach."""
+        rest = without(kept, literal.mask)
+        mates = 0
+        if literal.value & self.exclusion.members:
+            mates = self.exclusion.implied(literal) & ~self.exclusion.implied(rest) & ~rest.mask
+        facts = self._other_facts(literal.mask)
+        if reach.add([*facts, *self._other_facts(mates)]):
+            return rest
+        if mates and reach.add(facts):
+            # It matters for what it excludes; if that is little, it is said instead.
+            needed = 0
+            for mate in set_bits(mates):
+                if not reach.add(self._other_facts(1 << mate)):
+                    needed |= 1 << mate
+                    if needed.bit_count() > _FEW_EXCLUDED:
+                        return kept
+            return PartialState(rest.mask | needed, rest.value)
+        return kept
+
+    def _other_facts(self, bits: int) -> list[int]:
+        """All values of the variables of some bits."""
+        found: list[int] = []
+        for bit in set_bits(bits):
+            variable = self.packing.owner(bit)
+            values = (0, 2) if self.packing.unknown[variable] is None else (0, 1, 2, 3)
+            found.extend(4 * variable + value for value in values)
+        return found
+
+
+class _Reach:
+    """What is reached in the relaxation, growing as long as the goal is not."""
+
+    def __init__(
+        self, users: list[list[int]], adds: list[tuple[int, ...]], counts: list[int], goal: int
+    ) -> None:
+        self.users, self.adds, self.goal = users, adds, goal
+        self.left = counts.copy()
+        self.reached = bytearray(len(users))
+
+    def add(self, facts: Iterable[int]) -> bool:
+        """Add facts and what follows; unless the goal would be reached: then nothing changes."""
+        new: list[int] = []
+        for fact in facts:
+            if not self.reached[fact]:
+                self.reached[fact] = 1
+                new.append(fact)
+        used = 0
+        for fact in new:  # grows while it is read
+            if fact == self.goal:
+                break
+            used += 1
+            for operator in self.users[fact]:
+                self.left[operator] -= 1
+                if not self.left[operator]:
+                    for added in self.adds[operator]:
+                        if not self.reached[added]:
+                            self.reached[added] = 1
+                            new.append(added)
+        if used == len(new):
+            return True
+        for fact in new[:used]:
+            for operator in self.users[fact]:
+                self.left[operator] += 1
+        for fact in new:
+            self.reached[fact] = 0
+        return False

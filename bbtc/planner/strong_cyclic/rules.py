@@ -1,0 +1,264 @@
+"""From a policy to rules, and from rules to a tree: ``Fallback(goal, Sequence(guard, action)…)``.
+
+Rules are tried in the order of their distance to the goal. Every action reads its precondition before it
+starts. Besides, the guard of a rule holds what keeps the action from being forbidden, and of what the rest of
+the plan needs as much as tells the rule from others. Nothing that is read is ever unknown: what might be is
+read as false then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from bbtc.ground.condition import (
+    FALSE,
+    TRUE,
+    And,
+    Condition,
+    Constant,
+    Is,
+    Known,
+    Not,
+    Or,
+    conjunction,
+    disjunction,
+    negation,
+    variables,
+)
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.planner.strong_cyclic.determinised import Determinised
+from bbtc.planner.strong_cyclic.exclusion import Exclusion
+from bbtc.planner.strong_cyclic.partial_state import (
+    PartialState,
+    as_conditions,
+    contains,
+    contradict,
+    entails,
+    literals,
+    satisfied,
+    united,
+    without,
+)
+from bbtc.planner.strong_cyclic.solve import Solved
+from bbtc.rewrite.simplify import numbered
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """Start ``action`` (its number in the task) where its precondition and one of ``guards`` hold."""
+
+    guards: tuple[Guard, ...]
+    action: int
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """Holds where ``partial`` does, and none of ``excluded``. ``kept`` are the bits of literals that are
+    more than a help to tell rules apart."""
+
+    partial: PartialState
+    excluded: tuple[PartialState, ...]
+    kept: int
+
+    def holds(self, state: int) -> bool:
+        """In a state?"""
+        return contains(self.partial, state) and not any(contains(each, state) for each in self.excluded)
+
+
+class Rules:
+    """The rules of a policy."""
+
+    def __init__(self, model: Determinised, exclusion: Exclusion, solved: Solved, limits: Limits) -> None:
+        self.model, self.exclusion, self.solved, self.limits = model, exclusion, solved, limits
+
+    def plain(self) -> list[Rule]:
+        """A rule for each pair, with all that the rest of the plan needs."""
+        return [Rule((self._guard(pair.partial, pair.action),), pair.action) for pair in self.solved.pairs]
+
+    def short(self) -> list[Rule]:
+        """Rules that decide alike in all states that were visited, with less in their guards, fewer of
+        them."""
+        rules = self._merged(self.plain())
+        undecided = [state for state in self.solved.visited if not satisfied(self.model.goal, state)]
+        found: list[Rule] = []
+        actions = self._decisions(rules, undecided)
+        for number, rule in enumerate(rules):
+            self.limits.check_time("the search for a small tree")
+            guards = list(rule.guards)
+            test = self.model.actions[rule.action].test
+            others = [
+                state for state in undecided if actions[state] != rule.action and satisfied(test, state)
+            ]
+            for at, guard in enumerate(guards):
+                guards[at] = self._shorter(guard, others)
+            short = Rule(tuple(guards), rule.action)
+            found.append(short)
+            undecided = [state for state in undecided if not self._applies(short, state)]
+            if not undecided and number < len(rules):
+                break  # the rest decides nothing that is met
+        return self._merged(found)
+
+    def _guard(self, partial: PartialState, action: int) -> Guard:
+        known = self.exclusion.closed(self.model.actions[action].common)
+        kept = 0
+        partial = without(partial, known.mask)
+        excluded: list[PartialState] = []
+        for each in self.solved.forbidden.of_action.get(action, ()):
+            if contradict(each, known):
+                continue
+            apart = (each.value ^ partial.value) & each.mask & partial.mask
+            if apart:  # it says already that this is not so
+                bits = apart & partial.value or apart
+                kept |= self._whole((bits & -bits).bit_length() - 1) & partial.mask
+            elif contradict(each, self.exclusion.closed(united(known, partial))):
+                kept |= partial.mask
+            else:
+                excluded.append(without(each, known.mask))
+        alone = [each for each in excluded if self._opposite(each) is not None]
+        for each in alone:
+            opposite = self._opposite(each)
+            assert opposite is not None
+            partial, kept = united(partial, opposite), kept | opposite.mask
+        rest = tuple(each for each in excluded if each not in alone)
+        return Guard(partial, rest, kept)
+
+    def _whole(self, bit: int) -> int:
+        return self.model.packing.bits(self.model.packing.owner(bit))
+
+    def _opposite(self, partial: PartialState) -> PartialState | None:
+        if partial.mask.bit_count() == 1:
+            variable = self.model.packing.owner(partial.mask.bit_length() - 1)
+            if self.model.packing.unknown[variable] is None or not partial.mask >> variable & 1:
+                return PartialState(partial.mask, partial.mask & ~partial.value)
+        return None
+
+    def _decisions(self, rules: Sequence[Rule], states: Sequence[int]) -> dict[int, int]:
+        """The action of each state, -1 where no rule applies."""
+        return {
+            state: next((rule.action for rule in rules if self._applies(rule, state)), -1) for state in states
+        }
+
+    def _applies(self, rule: Rule, state: int) -> bool:
+        return satisfied(self.model.actions[rule.action].test, state) and any(
+            guard.holds(state) for guard in rule.guards
+        )
+
+    def _shorter(self, guard: Guard, others: list[int]) -> Guard:
+        """Without what is not needed to hold in none of some states."""
+        against = [state for state in others if not any(contains(each, state) for each in guard.excluded)]
+        if any(contains(guard.partial, state) for state in against):
+            return guard
+        # The literals that tell most states apart are tried last.
+        rated = []
+        for literal in literals(self.model.packing, guard.partial):
+            if not literal.mask & guard.kept:
+                apart = sum(not contains(literal, state) for state in against)
+                rated.append((apart, literal.value != 0, literal.mask, literal))
+        for *_, literal in sorted(rated, key=lambda each: each[:3]):
+            rest = without(guard.partial, literal.mask)
+            if not any(contains(rest, state) for state in against):
+                guard = replace(guard, partial=rest)
+        return guard
+
+    def _merged(self, rules: Sequence[Rule]) -> list[Rule]:
+        """Rules of one action together, the later ones moved before others that apply elsewhere only."""
+        found: list[Rule] = []
+        for rule in rules:
+            at = len(found) - 1
+            while at >= 0 and found[at].action != rule.action and self._apart(found[at], rule):
+                at -= 1
+            if at >= 0 and found[at].action == rule.action:
+                found[at] = Rule(self._joined((*found[at].guards, *rule.guards)), rule.action)
+            else:
+                found.append(rule)
+        return found
+
+    def _apart(self, one: Rule, other: Rule) -> bool:
+        return all(contradict(own, its) for own in self._where(one) for its in self._where(other))
+
+    def _where(self, rule: Rule) -> list[PartialState]:
+        """What holds for sure where a rule applies, for each of its guards."""
+        needs = self.model.actions[rule.action].common
+        return [self.exclusion.closed(united(needs, guard.partial)) for guard in rule.guards]
+
+    def _joined(self, guards: Sequence[Guard]) -> tuple[Guard, ...]:
+        found: list[Guard] = []
+        for guard in guards:
+            if any(
+                entails(guard.partial, each.partial) and set(each.excluded) <= set(guard.excluded)
+                for each in found
+            ):
+                continue
+            found.append(guard)
+        return tuple(found)
+
+
+# --- the tree ---------------------------------------------------------------------------------
+
+
+def tree_of(task: Task, model: Determinised, rules: Sequence[Rule]) -> Node:
+    """The rules as a tree."""
+    children: list[Node] = []
+    for rule in rules:
+        action = task.actions[rule.action]
+        guard = _condition(task, model, rule)
+        node: Node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
+        if guard != TRUE:
+            node = ControlNode("", "sequence", (ConditionNode("", guard), node))
+        children.append(node)
+    goal = ConditionNode("", certainly(task, task.goal))
+    return numbered(ControlNode("", "fallback", (goal, *children)) if children else goal)
+
+
+def _condition(task: Task, model: Determinised, rule: Rule) -> Condition:
+    """The guards of a rule, what they share first. A precondition that may be unknown is read here, too: the
+    action would wait for it."""
+    shared = rule.guards[0].partial
+    for guard in rule.guards[1:]:
+        differ = shared.mask & guard.partial.mask & ~(shared.value ^ guard.partial.value)
+        common = [each for each in literals(model.packing, shared) if each.mask & differ == each.mask]
+        shared = PartialState(sum(each.mask for each in common), sum(each.value for each in common))
+    precondition = task.actions[rule.action].precondition
+    parts: list[Condition] = []
+    if any(task.variables[variable].three_valued for variable in variables(precondition)):
+        parts.append(certainly(task, precondition))
+    parts.extend(_certain(task, model, shared))
+    ways = []
+    for guard in rule.guards:
+        own = list(_certain(task, model, without(guard.partial, shared.mask)))
+        own.extend(disjunction(_certain(task, model, each, negated=True)) for each in guard.excluded)
+        ways.append(conjunction(own))
+    return conjunction([*parts, disjunction(ways)])
+
+
+def _certain(
+    task: Task, model: Determinised, partial: PartialState, *, negated: bool = False
+) -> Iterator[Condition]:
+    for condition in as_conditions(model.packing, partial):
+        whole = certainly(task, condition)
+        yield (
+            certainly(task, negation(condition))
+            if negated and whole == condition
+            else (negation(whole) if negated else whole)
+        )
+
+
+def certainly(task: Task, condition: Condition) -> Condition:
+    """True where a condition is, and false where that is unknown, too."""
+    match condition:
+        case Is(variable, value) if value is not Truth.UNKNOWN and task.variables[variable].three_valued:
+            return And((Known(variable), condition))
+        case Is() | Known():
+            return condition
+        case And(parts):
+            return conjunction([certainly(task, part) for part in parts])
+        case Or(parts):
+            return disjunction([certainly(task, part) for part in parts])
+        case Not(part):
+            return certainly(task, negation(part))
+        case Constant(value):
+            return TRUE if value else FALSE
