@@ -144,6 +144,10 @@ def test_states_with_the_explanation_of_another_have_its_figures(data: st.DataOb
     """Every assignment of values is tried that keeps to the groups of which one member is true."""
     of = data.draw(tasks(most_actions=4))
     root = forgetful(data.draw(nodes(of, depth=4)))
+    unknown = [Truth.UNKNOWN if each.three_valued else Truth.FALSE for each in of.variables]
+    more = InitialState(Fraction(1, 2), tuple(unknown))
+    halves = [replace(each, probability=each.probability / 2) for each in of.initial]
+    of = replace(of, initial=(*halves, more))
     solver = Solver(of, Limits())
     visit = Visit(_Ticks(of, root, Limits(), solver.model, solver.exclusion))
     for state in solver.initial:
