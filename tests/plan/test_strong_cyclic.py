@@ -15,13 +15,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
-from bbtc.belief.simulate import figures, simulate
+from bbtc.belief.simulate import Figures, figures, simulate
 from bbtc.belief.soundness import violations
 from bbtc.belief.state import compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import Is, Known, evaluate
-from bbtc.ground.task import Task
+from bbtc.ground.task import InitialState, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
@@ -29,8 +29,9 @@ from bbtc.planner.mdp.packing import Packing
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.planner.strong_cyclic.partial_state import PartialState, as_conditions, contains, satisfied, united
-from bbtc.planner.strong_cyclic.quotient import quotient_chain
+from bbtc.planner.strong_cyclic.quotient import _Ticks, quotient_chain
 from bbtc.planner.strong_cyclic.solve import Solved, Solver
+from bbtc.planner.strong_cyclic.visit import Visit
 from bbtc.tree.nodes import ActionNode, ControlNode, Node, actions_of
 from bbtc.tree.validate import check_tree
 from tests.conftest import REPOSITORY
@@ -136,6 +137,42 @@ def test_the_quotient_of_any_tree_without_memory_has_the_figures_of_its_chain(da
     quotient = quotient_chain(of, root, Limits(), solver.model, solver.exclusion)
     whole, small = figures(of, root, chain), figures(of, root, quotient)
     assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
+
+
+@settings(max_examples=amount(250, 5000), deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_states_with_the_explanation_of_another_have_its_figures(data: st.DataObject) -> None:
+    """Every assignment of values is tried that keeps to the groups of which one member is true."""
+    of = data.draw(tasks(most_actions=4))
+    root = forgetful(data.draw(nodes(of, depth=4)))
+    unknown = [Truth.UNKNOWN if each.three_valued else Truth.FALSE for each in of.variables]
+    more = InitialState(Fraction(1, 2), tuple(unknown))
+    halves = [replace(each, probability=each.probability / 2) for each in of.initial]
+    of = replace(of, initial=(*halves, more))
+    solver = Solver(of, Limits())
+    visit = Visit(_Ticks(of, root, Limits(), solver.model, solver.exclusion))
+    for state in solver.initial:
+        visit.all_from(state)
+    packing = solver.model.packing
+
+    def outcome(values: tuple[Truth, ...]) -> Figures:
+        at = replace(of, initial=(InitialState(Fraction(1), values),))
+        return replace(figures(at, root, explore(at, root, Limits())), states=0, failures=())
+
+    for values in product(*(sorted(variable.values) for variable in of.variables)):
+        groups = solver.exclusion.groups
+        if any(sum(values[member] is Truth.TRUE for member in group) > 1 for group in groups):
+            continue
+        state = packing.pack(bytes(values))
+        if state not in visit.nodes and visit.explained.number(state) is not None:
+            like = unpacked(packing, visit.representative(state))
+            assert outcome(values) == outcome(like)
+
+
+def unpacked(packing: Packing, state: int) -> tuple[Truth, ...]:
+    """The values of a state."""
+    found = packing.values(packing.split([state]), 0)
+    return tuple(Truth(value) for value in found)
 
 
 def forgetful(node: Node) -> Node:
