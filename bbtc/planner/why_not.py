@@ -148,7 +148,13 @@ class RootFinder:
 
         repairs: Repairs[_Fact] = Repairs(ways, lambda _: 1.0, self._limits)
         need = every(_lacking(part, facts) for part in self.lost(values))
-        return tuple(self._block(root, values) for root in repairs.roots(need))
+        roots = repairs.roots(need)
+        given = bytearray(values)
+        for root in roots:
+            variable, value = root.what
+            given[variable] = value
+        # What asks for a fact and for its contrary, as no sane goal does, has no repair.
+        return () if roots and self.lost(bytes(given)) else tuple(self._block(root, values) for root in roots)
 
     def _forgets_first(self, need: Need[_Fact], variable: int) -> bool:
         """Whether it takes the variable to be unknown, which nothing makes it: to find out about it is no way

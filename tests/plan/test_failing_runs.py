@@ -249,6 +249,14 @@ def test_the_fact_that_a_circle_comes_back_to_is_the_root() -> None:
     assert RootFinder(of, Limits()).blocks(bytes([F, T, F])) == (), "at the charger nothing is lost"
 
 
+def test_of_what_asks_for_a_fact_and_its_contrary_nothing_is_told() -> None:
+    """Neither value would do; the second goal needs both of an action."""
+    of = task("a b", {}, conjunction([Is(0, T), Is(0, F)]))
+    assert RootFinder(of, Limits()).blocks(bytes([T, F])) == ()
+    win = action("win", conjunction([Is(1, T), Is(1, F)]), ("1", {0: T}))
+    assert RootFinder(task("a b", {}, Is(0, T), win), Limits()).blocks(bytes([F, F])) == ()
+
+
 def test_two_things_lost_are_both_told() -> None:
     of = task("a b won", {}, Is(2, T), action("win", _both(0, 1), ("1", {2: T})))
     assert [block.fact for block in RootFinder(of, Limits()).blocks(bytes([F, F, F]))] == ["a()", "b()"]

@@ -139,7 +139,7 @@ def test_the_quotient_of_any_tree_without_memory_has_the_figures_of_its_chain(da
     assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
 
 
-@settings(max_examples=amount(250, 5000), deadline=None, suppress_health_check=list(HealthCheck))
+@examples(amount(250, 5000))
 @given(data=st.data())
 def test_states_with_the_explanation_of_another_have_its_figures(data: st.DataObject) -> None:
     """Every assignment of values is tried that keeps to the groups of which one member is true."""
