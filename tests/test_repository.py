@@ -8,6 +8,7 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -120,6 +121,13 @@ def test_the_page_on_tests_names_every_long_form() -> None:
         if re.search("^from tests.long_form import", text_of(path), re.MULTILINE)
     }
     assert set(re.findall(r"^\| `(tests/[\w/]+\.py)`", page, re.MULTILINE)) == sweeps
+
+
+def test_every_folder_of_tests_is_looked_into(pytestconfig: pytest.Config) -> None:
+    passed_over = pytestconfig.getini("norecursedirs")
+    folders = {path.relative_to(REPOSITORY).parent for path in (REPOSITORY / "tests").rglob("test_*.py")}
+    names = {name for folder in folders for name in folder.parts}
+    assert [name for name in sorted(names) if any(fnmatch(name, glob) for glob in passed_over)] == []
 
 
 def test_profiles_alone_decide_how_many_examples_are_drawn() -> None:

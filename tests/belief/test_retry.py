@@ -16,7 +16,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 from bbtc.tree.validate import check_tree
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import Ticking
 

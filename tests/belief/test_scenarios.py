@@ -15,7 +15,7 @@ from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 
 T = Truth.TRUE
 

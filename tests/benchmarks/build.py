@@ -14,7 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.build.projects import project, several
+from tests.builder.projects import project, several
 
 TREES = 200
 RUNS = 25

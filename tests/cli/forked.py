@@ -146,7 +146,7 @@ def _read(pipes: list[int]) -> list[str]:
 
 
 def _warm_up() -> None:
-    from tests.build.projects import COIN
+    from tests.builder.projects import COIN
 
     home = Path.cwd()
     sys.stderr = io.TextIOWrapper(io.BytesIO())

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.build.projects import COIN
+from tests.builder.projects import COIN
 from tests.cli.forked import Commands, commands
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="files as POSIX has them")

@@ -13,7 +13,7 @@ from bbtc.cli import output
 from bbtc.cli.output import ProgressLine
 from bbtc.limits import Stage
 from tests.conftest import REPOSITORY
-from tests.plan.test_bounds import coins
+from tests.planner.test_bounds import coins
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are a POSIX thing")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.build.projects import COIN, REPOSITORY
+from tests.builder.projects import COIN, REPOSITORY
 from tests.long_form import LONG
 
 BBTC = f"{shlex.quote(sys.executable)} -m bbtc.cli.main"

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from bbtc.files.folder import TEMPORARY
-from tests.build.projects import COIN
+from tests.builder.projects import COIN
 from tests.cli.forked import Commands, commands
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="permissions of root are dropped as in Linux")

@@ -17,7 +17,7 @@ from bbtc.source import SourceFile
 from bbtc.syntax.parser import parse
 from tests.conftest import corpus_folder
 from tests.ground import reference
-from tests.plan.examples import published
+from tests.planner.examples import published
 
 CORPUS = corpus_folder()
 pytestmark = pytest.mark.skipif(CORPUS is None, reason="no corpus beside the repository")

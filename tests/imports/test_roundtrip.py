@@ -21,8 +21,8 @@ from bbtc.kleene import Truth
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree, walk
 from bbtc.tree.validate import check_tree
+from tests.backends.test_btcpp import nested
 from tests.domains.problems import PROBLEMS, Problem, plan_of
-from tests.export.test_btcpp import nested
 from tests.imports.labels import labelled
 from tests.long_form import amount
 from tests.profiles import examples

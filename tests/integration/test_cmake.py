@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from bbtc.version import __version__
-from tests.build.projects import COIN
+from tests.builder.projects import COIN
 from tests.integration.tools import REPOSITORY, edit, program, recipe, run, runs, tool
 
 CMAKE_DIR = REPOSITORY / "bbtc" / "cmake"

@@ -17,7 +17,7 @@ import pytest
 
 from bbtc.diagnostics import BbtcError
 from bbtc.files.depfile import depfile
-from tests.build.projects import COIN, bbtc
+from tests.builder.projects import COIN, bbtc
 from tests.integration.tools import tool
 from tests.long_form import amount
 

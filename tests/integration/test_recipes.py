@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.build.projects import COIN
+from tests.builder.projects import COIN
 from tests.integration.tools import REPOSITORY, edit, program, recipe, run, runs, tool
 
 PAGE = (REPOSITORY / "docs" / "build-systems.md").read_text("utf-8")

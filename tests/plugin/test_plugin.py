@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.build.projects import COIN, REPOSITORY, bbtc, project
+from tests.builder.projects import COIN, REPOSITORY, bbtc, project
 
 pytest_plugins = "pytester"
 

@@ -22,8 +22,8 @@ from bbtc.planner.result import Plan
 from bbtc.rewrite.simplify import size
 from bbtc.tree.nodes import actions_of, retries_of
 from bbtc.tree.validate import check_tree
-from tests.plan.examples import Optimum, cases
-from tests.plan.test_refine import action, task
+from tests.planner.examples import Optimum, cases
+from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
 

@@ -22,7 +22,7 @@ from bbtc.rewrite.simplify import numbered, simplified, size, without_idle_branc
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from bbtc.tree.validate import check_tree
 from tests.domains.brute_force import runs_of
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import nodes, tasks
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from bbtc.builder.runner import build
-from tests.build.projects import REPOSITORY, bbtc, several
+from tests.builder.projects import REPOSITORY, bbtc, several
 from tests.long_form import amount
 
 TREES = 10

@@ -16,7 +16,7 @@ from bbtc.planner.result import Plan, Refinement
 from bbtc.planner.strategies import DEFAULT
 from bbtc.tree.nodes import walk
 from tests.domains.problems import PROBLEMS, Problem, task_of
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
 

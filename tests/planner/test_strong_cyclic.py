@@ -37,7 +37,7 @@ from bbtc.tree.validate import check_tree
 from tests.conftest import REPOSITORY
 from tests.ground.examples import task_of
 from tests.long_form import amount
-from tests.plan.strong_cyclic_reference import strong_cyclic_states
+from tests.planner.strong_cyclic_reference import strong_cyclic_states
 from tests.profiles import examples
 from tests.strategies import nodes, tasks
 
@@ -396,7 +396,7 @@ def test_a_number_of_actions_is_refused() -> None:
 
 def test_trees_do_not_depend_on_the_seed_of_hashes() -> None:
     program = (
-        "from tests.plan.test_strong_cyclic import plan, walk\n"
+        "from tests.planner.test_strong_cyclic import plan, walk\n"
         "print(plan(walk(9, bare=(5,), ways=((3, 5), (4, 6), (2, 8), (0, 3)))).tree.root)\n"
     )
     printed = {

@@ -6,7 +6,7 @@ from bbtc.ground.condition import FALSE, Is
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.h_add import Relaxation, possible
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 

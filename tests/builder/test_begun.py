@@ -15,7 +15,7 @@ import pytest
 from bbtc.backends.begun import interface_changes
 from bbtc.backends.btcpp.project import btcpp_project
 from bbtc.builder.runner import build
-from tests.build.projects import REPOSITORY, bbtc, project, snapshot
+from tests.builder.projects import REPOSITORY, bbtc, project, snapshot
 from tests.strategies import soda_tree
 
 CAN = """(define (domain can)

@@ -25,7 +25,7 @@ from bbtc.verifier.solve import Recomputed, recompute
 from bbtc.verifier.verdict import verify
 from tests.conftest import GOLDEN
 from tests.long_form import amount
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.strategies import soda_tree, trees

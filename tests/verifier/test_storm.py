@@ -28,12 +28,12 @@ from bbtc.verifier.prism import prism_text
 from bbtc.verifier.process import process_of
 from bbtc.verifier.verdict import TOLERANCE, verify
 from tests.long_form import amount
-from tests.plan.examples import Optimum, cases
+from tests.planner.examples import Optimum, cases
 from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.strategies import HOSTILE_NAMES, soda_tree, tasks, trees
-from tests.verify.optimum import best_probability
-from tests.verify.test_figures import FORMS
+from tests.verifier.optimum import best_probability
+from tests.verifier.test_figures import FORMS
 
 pytest.importorskip("stormpy", reason="Storm is not installed: pip install 'bbtc[storm]'")
 

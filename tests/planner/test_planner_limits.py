@@ -22,7 +22,7 @@ from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.options import Options
 from bbtc.source import SourceFile
 from tests.conftest import REPOSITORY
-from tests.plan.test_bounds import coins
+from tests.planner.test_bounds import coins
 
 
 def lights(count: int) -> str:

@@ -22,7 +22,7 @@ from bbtc.builder import pool, runner, state
 from bbtc.builder.job import Job
 from bbtc.builder.runner import BuildReport, build
 from bbtc.manifest.entries import TreeEntry
-from tests.build.projects import COIN, REPOSITORY, bbtc, project, several, snapshot
+from tests.builder.projects import COIN, REPOSITORY, bbtc, project, several, snapshot
 
 LAMP = "(define (domain lamp) (:predicates (lit)) (:action on :effect (lit)))\n"
 LIGHT = "(define (problem light) (:domain lamp) (:goal (lit)))\n"

@@ -15,7 +15,7 @@ from bbtc.planner.chaining.flaws import Simulated
 from bbtc.planner.chaining.refine import refine
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode
 from tests.ground.examples import task_of
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 
 T, U, F = Truth.TRUE, Truth.UNKNOWN, Truth.FALSE
 

@@ -17,7 +17,7 @@ from bbtc.planner.result import Plan
 from bbtc.planner.strategies import STRATEGIES, others
 from bbtc.rewrite.retry import longest_run
 from bbtc.tree.nodes import retries_of
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 
 LAMP = task(
     "on", {}, Is(0, Truth.TRUE), action("press", Is(0, Truth.FALSE), ("1/2", {0: Truth.TRUE}), ("1/2", {}))

@@ -34,8 +34,8 @@ from bbtc.planner.synthesis.tree import _Builder
 from bbtc.rewrite.retry import longest_run
 from bbtc.tree.nodes import ActionNode, ControlNode, Node, retries_of, walk
 from bbtc.tree.validate import check_tree
-from tests.plan.examples import Optimum, cases, corpus_optima
-from tests.plan.test_refine import action, task
+from tests.planner.examples import Optimum, cases, corpus_optima
+from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
 

@@ -18,8 +18,8 @@ from bbtc.planner.mdp.h_add import Facts, Relaxation, operators_of
 from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.solve import best_known
 from tests.long_form import amount
-from tests.plan.examples import Optimum, cases, public
-from tests.plan.test_refine import action, task
+from tests.planner.examples import Optimum, cases, public
+from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
 

@@ -17,7 +17,7 @@ import pytest
 from bbtc.builder.runner import BuildReport, build
 from bbtc.diagnostics import BbtcError
 from bbtc.files import folder as folders
-from tests.build.projects import COIN, bbtc, project, snapshot
+from tests.builder.projects import COIN, bbtc, project, snapshot
 
 MANIFEST = "trees: {c: {domain: c.pddl, target: 0.5, exports: [dot]}}\n"
 needs_links = pytest.mark.skipif(not hasattr(os, "symlink"), reason="no symbolic links on this system")

@@ -22,10 +22,10 @@ from bbtc.verifier.naming import numbered
 from bbtc.verifier.prism import prism_text
 from bbtc.verifier.verdict import verify
 from tests.long_form import amount
-from tests.plan.examples import Optimum, cases
+from tests.planner.examples import Optimum, cases
 from tests.profiles import examples
 from tests.strategies import tasks
-from tests.verify.test_figures import disagreements
+from tests.verifier.test_figures import disagreements
 
 RETRIES: tuple[Retries, ...] = get_args(Retries)
 WITH_STORM = storm.is_installed()

@@ -20,7 +20,7 @@ from bbtc.planner.bounds import task_value
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from tests.domains.problems import bbtc
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 
 T, F = Truth.TRUE, Truth.FALSE
 

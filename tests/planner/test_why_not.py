@@ -24,8 +24,8 @@ from bbtc.planner.synthesis import policy
 from bbtc.planner.why_not import Block, DeadEnd, dead_ends
 from bbtc.source import SourceFile
 from tests.domains.problems import REPOSITORY, bbtc
-from tests.plan.test_bounds import ONESHOT, coins, one_shot
-from tests.plan.test_refine import action, task
+from tests.planner.test_bounds import ONESHOT, coins, one_shot
+from tests.planner.test_refine import action, task
 from tests.strategies import soda_tree
 
 T, F = Truth.TRUE, Truth.FALSE

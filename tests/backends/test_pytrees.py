@@ -28,8 +28,8 @@ from bbtc.limits import Limits
 from bbtc.replay.engines import PyTreesReplay
 from bbtc.replay.script import Run, Script
 from bbtc.tree.nodes import Tree, actions_of
+from tests.backends.test_btcpp import nested
 from tests.conftest import Golden
-from tests.export.test_btcpp import nested
 from tests.profiles import examples
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import random_run

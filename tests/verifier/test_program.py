@@ -29,7 +29,7 @@ from bbtc.verifier.program import (
     none_of,
     written_size,
 )
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 from tests.strategies import soda_tree
 
 HALF = Fraction(1, 2)

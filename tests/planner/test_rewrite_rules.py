@@ -21,7 +21,7 @@ from bbtc.rewrite.retry import with_least_attempts
 from bbtc.rewrite.shrink import shrunk
 from bbtc.rewrite.simplify import numbered, simplified, without_idle_branches
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 ALWAYS = Is(0, F)

@@ -11,7 +11,7 @@ from bbtc.ground.condition import TRUE, Is
 from bbtc.limits import Limits
 from bbtc.rewrite.shrink import shrunk
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, actions_of
-from tests.plan.test_refine import T, action, task
+from tests.planner.test_refine import T, action, task
 
 
 @pytest.mark.parametrize(("lift", "stairs", "left"), [(1, 10, ["ride()"]), (10, 1, ["climb()"])])

@@ -24,7 +24,7 @@ from bbtc.planner.failing_runs import failing_runs
 from bbtc.planner.why_not import Block, RootFinder
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
 from tests.domains.problems import bbtc
-from tests.plan.test_refine import action, task
+from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import trees
 

@@ -23,9 +23,9 @@ from bbtc.planner.mdp.finite_horizon import horizon_values
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.mdp.state_space import StateSpace
-from tests.plan.examples import Optimum, cases, corpus_optima
-from tests.plan.test_refine import action, task
-from tests.plan.test_space import by_simulator
+from tests.planner.examples import Optimum, cases, corpus_optima
+from tests.planner.test_refine import action, task
+from tests.planner.test_space import by_simulator
 from tests.profiles import examples
 from tests.strategies import tasks
 

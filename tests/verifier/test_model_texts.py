@@ -22,7 +22,7 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
 from bbtc.verifier.verdict import verify
 from tests.long_form import amount
 from tests.strategies import soda_tree
-from tests.verify.test_storm import ask, ask_about_jani
+from tests.verifier.test_storm import ask, ask_about_jani
 
 HALF = Fraction(1, 2)
 
