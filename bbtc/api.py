@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from bbtc.builder.runner import BuildReport
     from bbtc.comparison import Comparison
     from bbtc.disturbance.perturbed import PerturbedRuns
+    from bbtc.disturbance.recovery import Recovery
     from bbtc.ground.task import Task
     from bbtc.model.domain import Model
     from bbtc.planner.bounds import TaskValue
@@ -240,6 +241,27 @@ def perturb(
     chance, limits = parse_probability(str(rate)), limits or Limits()
     known = _on_task(tree, task, limits)
     return perturbed_runs(known.task, known.root, chance, limits, runs=runs, seed=seed, most_ticks=max_ticks)
+
+
+def recovery(
+    tree: Source | Tree | Plan,
+    *,
+    task: Task | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    limits: Limits | None = None,
+) -> Recovery:
+    """What a new tree attains from every state that actions lead to, beside the best that is possible from
+    there; of more than 10,000 states, or where ``samples`` are asked for, from a uniform sample of them. A
+    tree from a file knows the actions that it uses: give the ``task`` for all.
+
+    Raises as :func:`simulate` does, and ``ValueError`` for samples below 1.
+    """
+    from bbtc.disturbance.recovery import recovery as recovery_of
+
+    limits = limits or Limits()
+    known = _on_task(tree, task, limits)
+    return recovery_of(known.task, known.root, limits, samples=samples, seed=seed)
 
 
 def scenarios(tree: Source | Tree | Plan, count: int, *, limits: Limits | None = None) -> list[Scenario]:

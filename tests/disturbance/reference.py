@@ -73,6 +73,28 @@ def reachable(task: Task, most: int = 3000) -> set[State] | None:
     return found
 
 
+def best_chances(task: Task, states: set[State], sweeps: int = 3000) -> dict[State, float]:
+    """The best probability of ever reaching the goal from each state, by value iteration."""
+    choices = {
+        state: [
+            [(after, float(chance)) for (after, _), chance in outcomes_in(action, state).items()]
+            for action in task.actions
+            if value_of(action.precondition, state) == "T"
+        ]
+        for state in states
+    }
+    values = {state: float(value_of(task.goal, state) == "T") for state in states}
+    for _ in range(sweeps):
+        change = 0.0
+        for state, ways in choices.items():
+            best = max((sum(p * values[after] for after, p in way) for way in ways), default=0.0)
+            if best > values[state]:
+                change, values[state] = max(change, best - values[state]), best
+        if change < 1e-13:
+            break
+    return values
+
+
 class Exact:
     """The chances of a tree in a world that changes with a rate before each tick, within a number of
     ticks."""
@@ -81,13 +103,15 @@ class Exact:
         self.task, self.root, self.rate, self.changes = task, root, rate, changes
         self._seen: dict[Key, tuple[str, After]] = {}
 
-    def chances(self, ticks: int) -> dict[str, float]:
-        """How probably runs end in each way, and the expected starts, unready starts and cost."""
+    def chances(self, ticks: int, start: State | None = None) -> dict[str, float]:
+        """How probably runs end in each way, and the expected starts, unready starts and cost; from a state,
+        or from the initial belief."""
         belief: dict[Key, float] = {}
         for initial in self.task.initial:
-            key: Key = (tuple(map(int, initial.values)), (), ())
+            key: Key = (tuple(map(int, initial.values)) if start is None else start, (), ())
             belief[key] = belief.get(key, 0.0) + float(initial.probability)
         found = dict.fromkeys(("success", "missed", "failure", "blocked", "starts", "unready", "cost"), 0.0)
+        self.stops: dict[State, float] = {}
         for _ in range(ticks):
             changed: dict[Key, float] = {}
             for (state, finished, tries), p in belief.items():
@@ -100,6 +124,8 @@ class Exact:
                 kind, results = self._ticked(key)
                 if kind not in ("ready", "unready"):
                     found[kind] += p
+                    if kind in ("failure", "blocked"):
+                        self.stops[key[0]] = self.stops.get(key[0], 0.0) + p
                     continue
                 found["starts"] += p
                 found["unready"] += p * (kind == "unready")
