@@ -67,7 +67,9 @@ def recovery_lines(tree: Tree, found: Recovery, whole: bool) -> list[str]:
     ]
     lines.extend(f"  {word}   {exact(share)}{note}" for word, share, note in ends if share)
     if found.given_up:
-        lines.append("  gives up where the goal is in reach, by what is missing:")
+        lines.append(
+            "  gives up where the goal is in reach, by what is missing (shares of the runs from all of them):"
+        )
     for each in found.given_up[:_MOST_GROUPS]:
         what = stopped(tree, each.node, each.condition, each.status)
         where = f"{counted(each.states, 'state')}, such as {_state(tree, each.example)}"
