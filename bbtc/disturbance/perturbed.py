@@ -120,6 +120,9 @@ _ENDINGS = {
 """How a run ended, by the root's status and whether the goal was true where that is success."""
 
 
+_NOTHING = Draw(())
+
+
 class _Node:
     """A state in which the tree is ticked, and what may come next. ``status`` is the root's; of a started
     action ``draw`` and ``next`` say what it leads to, and ``costs`` at what scaled cost."""
@@ -132,7 +135,7 @@ class _Node:
         self.changed: list[_Node] = []
         self.status = -1
         self.ready = self.won = False
-        self.draw = Draw(())
+        self.draw = _NOTHING
         self.next: list[_Node] = []
         self.costs: list[int] = []
 
@@ -152,7 +155,8 @@ class _Sampler:
         self._on_start = memory_of(root).started
         self.scale = math.lcm(1, *(cost.denominator for action in actions for cost in _costs(action)))
         self._nodes: dict[tuple[Values, int], _Node] = {}
-        self._after: dict[Values, tuple[tuple[Fraction, Values], ...]] = {}
+        self._after: dict[Values, tuple[Draw, list[Values]]] = {}
+        self._outcome: dict[tuple[int, Values], tuple[Draw, list[int], list[Values]]] = {}
         belief = list(initial_belief(task).items())
         self.start = Draw(chance for _, chance in belief)
         self._starts = [values for values, _ in belief]
@@ -162,6 +166,7 @@ class _Sampler:
         if len(self._nodes) > _MOST_KEPT or len(self._after) > _MOST_KEPT:
             self._nodes.clear()
             self._after.clear()
+            self._outcome.clear()
         return [self._node(values, 0) for values in self._starts]
 
     def _node(self, values: Values, memory: int) -> _Node:
@@ -181,20 +186,29 @@ class _Sampler:
         if status >= STARTED:
             action = status - STARTED
             node.ready = self._ready[action](node.values) == Truth.TRUE
-            results = self._run[action](node.values)
-            node.draw = Draw(result.probability for result in results)
+            node.draw, node.costs, after = self._outcomes(action, node.values)
             memory = node.memory + self._on_start[action]
-            node.next = [self._node(result.values, memory) for result in results]
-            node.costs = [int(result.cost * self.scale) for result in results]
+            node.next = [self._node(values, memory) for values in after]
         return status
+
+    def _outcomes(self, action: int, state: Values) -> tuple[Draw, list[int], list[Values]]:
+        """What an action may lead to, and at what scaled cost; whatever the tree remembers."""
+        key = (action, state)
+        found = self._outcome.get(key)
+        if found is None:
+            results = self._run[action](state)
+            draw = Draw(result.probability for result in results)
+            costs = [int(result.cost * self.scale) for result in results]
+            found = self._outcome[key] = draw, costs, [result.values for result in results]
+        return found
 
     def changes(self, node: _Node) -> Draw:
         """What a change may do in a state that meets one for the first time."""
         if node.values not in self._after:
-            self._after[node.values] = self._facts.changes(node.values)
-        found = self._after[node.values]
-        node.change = Draw(chance for chance, _ in found)
-        node.changed = [self._node(after, node.memory) for _, after in found]
+            found = self._facts.changes(node.values)
+            self._after[node.values] = Draw(chance for chance, _ in found), [after for _, after in found]
+        node.change, after = self._after[node.values]
+        node.changed = [self._node(values, node.memory) for values in after]
         return node.change
 
 
