@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import islice
+from itertools import chain, islice
 
 from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
+from bbtc.markov import reachable
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -285,42 +286,33 @@ def _apply(effect: me.Effect, result: Reached) -> None:
 
 
 def relevant(model: md.Model) -> set[str]:
-    """The actions that can matter to the goal, to a reward metric or to a template, as predicates tell.
-    Grounding knows atoms, and finds more (:mod:`bbtc.ground.relevance`, :mod:`bbtc.ground.prune`)."""
-    predicates: set[str] = set()
-    actions: set[str] = set()
-    todo: list[str] = []
+    """The actions that can matter to the goal, a reward metric or a template, as predicates tell: checks
+    look at models that may be too large to ground. Grounding knows atoms, and finds more
+    (:mod:`bbtc.ground.relevance`, :mod:`bbtc.ground.prune`)."""
+    setters, rules = _setters(model)
 
-    def read(formulas: Iterable[mf.Formula]) -> None:
-        fresh = _read_in(formulas) - predicates
-        predicates.update(fresh)
-        todo.extend(fresh)
+    def leads(node: tuple[bool, str]) -> Iterator[tuple[bool, str]]:
+        is_action, name = node
+        if is_action:
+            return read(schema_conditions(model.schemas[name]) if name in model.schemas else ())
+        return chain(
+            read(rule.condition for rule in rules.get(name, ())),
+            ((True, action) for action in setters.get(name, ())),
+        )
 
-    def act(name: str) -> None:
-        if name not in actions:
-            actions.add(name)
-            if name in model.schemas:
-                read(schema_conditions(model.schemas[name]))
+    def read(formulas: Iterable[mf.Formula]) -> Iterator[tuple[bool, str]]:
+        return ((False, predicate) for predicate in _read_in(formulas))
 
-    if model.goal is not None:
-        read([model.goal])
+    start = [] if model.goal is None else [*read([model.goal])]
     for template in model.templates.values():
-        read(template_conditions(template))
-        for call in md.calls(template.body):
-            if call.kind == "action":
-                act(call.name)
+        start += read(template_conditions(template))
+        start += [(True, call.name) for call in md.calls(template.body) if call.kind == "action"]
     for sensor in model.sensors:
-        read([sensor.condition, sensor.sensed])
+        start += read([sensor.condition, sensor.sensed])
     for name, schema in model.schemas.items():
         if schema.observe is not None or (model.metric == "reward" and me.earns(schema.effect)):
-            act(name)
-    setters, rules = _setters(model)
-    while todo:
-        predicate = todo.pop()
-        read([rule.condition for rule in rules.get(predicate, ())])
-        for name in setters.get(predicate, ()):
-            act(name)
-    return actions
+            start.append((True, name))
+    return {name for is_action, name in reachable(start, leads) if is_action}
 
 
 def _setters(model: md.Model) -> tuple[dict[str, list[str]], dict[str, list[md.Rule]]]:

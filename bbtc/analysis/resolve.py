@@ -14,6 +14,7 @@ from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
 from bbtc.diagnostics import Related, Report
 from bbtc.kleene import Truth
+from bbtc.markov import reachable
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -200,13 +201,7 @@ def _check_stratified(names: Names, rules: tuple[md.Rule, ...]) -> None:
 
 
 def _below(start: str, reads: dict[str, dict[str, bool]]) -> set[str]:
-    seen, todo = {start}, [start]
-    while todo:
-        for predicate in reads.get(todo.pop(), {}):
-            if predicate not in seen:
-                seen.add(predicate)
-                todo.append(predicate)
-    return seen
+    return reachable([start], lambda predicate: reads.get(predicate, ()))
 
 
 def _signed(formula: mf.Formula, negative: bool) -> Iterator[tuple[str, bool]]:

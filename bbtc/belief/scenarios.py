@@ -13,6 +13,7 @@ from bbtc.belief.chain import Chain
 from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.limits import Limits
+from bbtc.markov import reachable
 from bbtc.tree.nodes import ActionNode
 
 
@@ -118,14 +119,7 @@ def _ending(chain: Chain, ends: Sequence[int]) -> set[int]:
     for state, edges in enumerate(chain.edges):
         for edge in edges:
             before[edge.successor].append(state)
-    ending = set(ends)
-    waiting = list(ending)
-    while waiting:
-        for state in before[waiting.pop()]:
-            if state not in ending:
-                ending.add(state)
-                waiting.append(state)
-    return ending
+    return reachable(ends, before.__getitem__)
 
 
 def _scenario(chain: Chain, probability: Fraction, path: _Path) -> Scenario:
