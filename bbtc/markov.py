@@ -33,6 +33,14 @@ def reachable(start: Iterable[_N], successors: Callable[[_N], Iterable[_N]]) -> 
     return found
 
 
+def distribution(parts: Iterable[tuple[_N, Fraction]]) -> dict[_N, Fraction]:
+    """A distribution from its parts, those of equal outcomes added up, in order of appearance."""
+    found: dict[_N, Fraction] = {}
+    for outcome, probability in parts:
+        found[outcome] = found[outcome] + probability if outcome in found else probability
+    return found
+
+
 def components(successors: Sequence[Sequence[int]]) -> list[list[int]]:
     """Strongly connected components, each after all the components it can reach."""
     number = [0] * len(successors)

@@ -124,25 +124,16 @@ def _acts(body: md.Body, acting: set[str]) -> bool:
 
 
 def _check_skippers(report: Report, body: md.Body, acting: set[str]) -> None:
-    match body:
-        case md.BodyControl(kind, children):
-            if kind == "skipper":
-                for position, child in enumerate(children):
-                    # A foreach with actions becomes several children, so it may not be the last either.
-                    several = isinstance(child, md.BodyForeach)
-                    if (several or position < len(children) - 1) and _acts(child, acting):
-                        report.error(
-                            "BBT0216",
-                            "in a skipper only the last child may contain actions",
-                            child.span,
-                            "put the attempts into one last child: "
-                            "(skipper c (sequence (fallback attempt…) c))",
-                        )
-            for child in children:
-                _check_skippers(report, child, acting)
-        case md.BodyForeach(_, child):
-            _check_skippers(report, child, acting)
-        case md.BodyCall() | md.BodyCondition():
-            return
-        case _:
-            assert_never(body)
+    for part in md.walk(body):
+        if not isinstance(part, md.BodyControl) or part.kind != "skipper":
+            continue
+        for position, child in enumerate(part.children):
+            # A foreach with actions becomes several children, so it may not be the last either.
+            several = isinstance(child, md.BodyForeach)
+            if (several or position < len(part.children) - 1) and _acts(child, acting):
+                report.error(
+                    "BBT0216",
+                    "in a skipper only the last child may contain actions",
+                    child.span,
+                    "put the attempts into one last child: (skipper c (sequence (fallback attempt…) c))",
+                )

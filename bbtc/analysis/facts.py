@@ -14,71 +14,13 @@ from bbtc.markov import reachable
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
-from bbtc.source import Span
 
 Value = tuple[str, Truth]
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """An atom in a condition. ``value`` is what makes the condition true; None for ``known``."""
-
-    atom: mf.Atom
-    value: Truth | None
-    span: Span | None
-
-
-def readings(formula: mf.Formula, negative: bool = False) -> Iterator[Reading]:
-    """Every atom of a condition, with the value that helps to make it true."""
-    match formula:
-        case mf.Atom(_, _, span):
-            yield Reading(formula, Truth.FALSE if negative else Truth.TRUE, span)
-        case mf.Test(kind, atom, span):
-            unknown = (kind == "unknown") is not negative
-            yield Reading(atom, Truth.UNKNOWN if unknown else None, span)
-        case mf.Equal():
-            return
-        case mf.Not(part):
-            yield from readings(part, not negative)
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                yield from readings(part, negative)
-        case mf.Quantified(_, _, part):
-            yield from readings(part, negative)
-        case _:
-            assert_never(formula)
-
-
 def plain(formula: mf.Formula) -> Iterator[str]:
     """Predicates whose unknown value makes the formula unknown: all but those in tests."""
-    match formula:
-        case mf.Atom(predicate):
-            yield predicate
-        case mf.Test() | mf.Equal():
-            return
-        case mf.Not(part) | mf.Quantified(_, _, part):
-            yield from plain(part)
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                yield from plain(part)
-        case _:
-            assert_never(formula)
-
-
-def body_conditions(body: md.Body) -> Iterator[mf.Formula]:
-    """The conditions in a template body."""
-    match body:
-        case md.BodyCondition(condition):
-            yield condition
-        case md.BodyControl(_, children):
-            for child in children:
-                yield from body_conditions(child)
-        case md.BodyForeach(_, child):
-            yield from body_conditions(child)
-        case md.BodyCall():
-            return
-        case _:
-            assert_never(body)
+    return (each.atom.predicate for each in mf.readings(formula) if each.value in (Truth.TRUE, Truth.FALSE))
 
 
 def schema_conditions(schema: md.Schema) -> Iterator[mf.Formula]:
@@ -96,7 +38,7 @@ def template_conditions(template: md.Template) -> Iterator[mf.Formula]:
     yield template.precondition
     if template.effect is not None:
         yield from me.conditions(template.effect)
-    yield from body_conditions(template.body)
+    yield from md.conditions(template.body)
 
 
 def all_conditions(model: md.Model) -> Iterator[mf.Formula]:
@@ -165,9 +107,9 @@ class Known:
         return tuple(all_conditions(self.model))
 
     @cached_property
-    def readings(self) -> tuple[Reading, ...]:
+    def readings(self) -> tuple[mf.Reading, ...]:
         """Every atom in them."""
-        return tuple(reading for formula in self.conditions for reading in readings(formula))
+        return tuple(reading for formula in self.conditions for reading in mf.readings(formula))
 
     @cached_property
     def reached(self) -> Reached:

@@ -180,25 +180,21 @@ def _in_formula(formula: mf.Formula) -> Iterator[_Use]:
 
 
 def _in_effect(effect: me.Effect) -> Iterator[_Use]:
-    match effect:
-        case me.Set(_, _, value, span):
-            if value is Truth.UNKNOWN:
-                yield ":unknown", span
-        case me.Add(to, _, _, span):
-            yield ":rewards" if to == "reward" else ":action-costs", span
-        case me.Together(parts):
-            for part in parts:
-                yield from _in_effect(part)
-        case me.When(condition, inner, span):
-            yield ":conditional-effects", span
-            yield from _in_formula(condition)
-            yield from _in_effect(inner)
-        case me.ForEach(_, inner, span):
-            yield ":universal-effects", span
-            yield from _in_effect(inner)
-        case me.Choice(branches, oneof, span):
-            yield ":non-deterministic" if oneof else ":probabilistic-effects", span
-            for branch in branches:
-                yield from _in_effect(branch.effect)
-        case _:
-            assert_never(effect)
+    for part in me.walk(effect):
+        match part:
+            case me.Set(_, _, value, span):
+                if value is Truth.UNKNOWN:
+                    yield ":unknown", span
+            case me.Add(to, _, _, span):
+                yield ":rewards" if to == "reward" else ":action-costs", span
+            case me.Together():
+                pass
+            case me.When(condition, _, span):
+                yield ":conditional-effects", span
+                yield from _in_formula(condition)
+            case me.ForEach(_, _, span):
+                yield ":universal-effects", span
+            case me.Choice(_, oneof, span):
+                yield ":non-deterministic" if oneof else ":probabilistic-effects", span
+            case _:
+                assert_never(part)

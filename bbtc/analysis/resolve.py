@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
-
-from typing_extensions import assert_never
 
 from bbtc.analysis import bodies, facts, formulas, truth_words
 from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections
@@ -184,9 +181,9 @@ def _check_stratified(names: Names, rules: tuple[md.Rule, ...]) -> None:
     """A derived predicate may depend on itself, but not on its own negation (or a test of it)."""
     reads: dict[str, dict[str, bool]] = {}
     for rule in rules:
-        for predicate, negative in _signed(rule.condition, False):
-            below = reads.setdefault(rule.predicate, {})
-            below[predicate] = below.get(predicate, False) or negative
+        for reading in mf.readings(rule.condition):
+            below, predicate = reads.setdefault(rule.predicate, {}), reading.atom.predicate
+            below[predicate] = below.get(predicate, False) or reading.value is not Truth.TRUE
     told: set[str] = set()
     for rule in rules:
         for predicate, negative in reads.get(rule.predicate, {}).items():
@@ -202,25 +199,6 @@ def _check_stratified(names: Names, rules: tuple[md.Rule, ...]) -> None:
 
 def _below(start: str, reads: dict[str, dict[str, bool]]) -> set[str]:
     return reachable([start], lambda predicate: reads.get(predicate, ()))
-
-
-def _signed(formula: mf.Formula, negative: bool) -> Iterator[tuple[str, bool]]:
-    match formula:
-        case mf.Atom(predicate):
-            yield predicate, negative
-        case mf.Test(_, atom):
-            yield atom.predicate, True
-        case mf.Equal():
-            return
-        case mf.Not(part):
-            yield from _signed(part, not negative)
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                yield from _signed(part, negative)
-        case mf.Quantified(_, _, part):
-            yield from _signed(part, negative)
-        case _:
-            assert_never(formula)
 
 
 def _sensor(names: Names, node: ast.Sensor) -> md.Sensor:

@@ -13,7 +13,7 @@ from bbtc.belief.chain import Chain
 from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.limits import Limits
-from bbtc.markov import reachable
+from bbtc.markov import distribution, reachable
 from bbtc.tree.nodes import ActionNode
 
 
@@ -84,10 +84,7 @@ def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterato
 
 def _merged(chain: Chain, state: int) -> dict[int, Fraction]:
     """Where a step leads: results that differ in cost or reward only are one."""
-    merged: dict[int, Fraction] = {}
-    for edge in chain.edges[state]:
-        merged[edge.successor] = merged.get(edge.successor, Fraction(0)) + edge.result.probability
-    return merged
+    return distribution((edge.successor, edge.result.probability) for edge in chain.edges[state])
 
 
 def _best_ends(chain: Chain, ends: Sequence[int], limits: Limits) -> dict[int, Fraction]:

@@ -15,7 +15,7 @@ from typing_extensions import assert_never
 from bbtc.ground import task as gt
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
 from bbtc.ground.effects import arrange, merge_outcomes
-from bbtc.markov import reachable
+from bbtc.markov import distribution, reachable
 
 
 def prune(task: gt.Task) -> gt.Task:
@@ -42,16 +42,13 @@ def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
     Those that effects set keep their order."""
     renumber = {old: new for new, old in enumerate(order)}
     mapper = _Mapper(renumber)
-    initial: dict[tuple[object, ...], gt.InitialState] = {}
-    for state in task.initial:
-        values = tuple(state.values[old] for old in renumber)
-        before = initial.get(values)
-        more = before.probability if before is not None else 0
-        initial[values] = gt.InitialState(state.probability + more, values)
+    initial = distribution(
+        (tuple(state.values[old] for old in renumber), state.probability) for state in task.initial
+    )
     return replace(
         task,
         variables=tuple(task.variables[old] for old in renumber),
-        initial=tuple(initial.values()),
+        initial=tuple(gt.InitialState(probability, values) for values, probability in initial.items()),
         goal=mapper.condition(task.goal),
         actions=tuple(map(mapper.action, task.actions)),
         templates=tuple(map(mapper.template, task.templates)),
