@@ -44,6 +44,20 @@ class _Index:
             found.extend(number for mask, value, number in self.under[bit] if state & mask == value)
         return found
 
+    def entailed(self, partial: PartialState) -> list[int]:
+        """The numbers of those that a partial state entails."""
+        known = partial.mask
+        return [
+            number
+            for mask, value, number in self._near(partial.value)
+            if known & mask == mask and partial.value & mask == value
+        ]
+
+    def _near(self, state: int) -> Iterator[tuple[int, int, int]]:
+        yield from self.other
+        for bit in set_bits(state & self.bits):
+            yield from self.under[bit]
+
 
 class Forbidden:
     """Pairs of partial state and action that a policy must not use: the action may lead to a dead end."""
@@ -126,6 +140,10 @@ class Covers:
         """One more."""
         self._index.add(len(self.partials), partial)
         self.partials.append(partial)
+
+    def entailed(self, partial: PartialState) -> list[int]:
+        """The numbers of those that a partial state entails."""
+        return self._index.entailed(partial)
 
     def number(self, state: int) -> int | None:
         """The number of the first of them that a state satisfies."""
