@@ -97,6 +97,8 @@ class Policy:
     def __init__(self, forbidden: Forbidden) -> None:
         self.forbidden = forbidden
         self.pairs: list[Pair] = []
+        self.kept: set[int] = set()
+        """The numbers of those that have not been dropped."""
         self._known: dict[tuple[PartialState, int], int] = {}
         self._index = _Index()
 
@@ -108,7 +110,17 @@ class Policy:
             return
         self._known[key] = len(self.pairs)
         self._index.add(len(self.pairs), pair.partial)
+        self.kept.add(len(self.pairs))
         self.pairs.append(pair)
+
+    def keep(self, numbers: set[int]) -> None:
+        """Drop all others."""
+        self.kept = numbers
+        self._known, self._index = {}, _Index()
+        for number in sorted(numbers):
+            pair = self.pairs[number]
+            self._known[pair.partial, pair.action] = number
+            self._index.add(number, pair.partial)
 
     def order(self, number: int) -> tuple[int, int]:
         """Sort key of a pair, the first to follow first."""
@@ -126,7 +138,7 @@ class Policy:
 
     def __iter__(self) -> Iterator[int]:
         """The numbers of the pairs, in the order in which they are followed."""
-        return iter(sorted(range(len(self.pairs)), key=self.order))
+        return iter(sorted(self.kept, key=self.order))
 
 
 class Covers:
