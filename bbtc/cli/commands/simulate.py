@@ -46,9 +46,6 @@ def command(
     output: str,
 ) -> None:
     """Print the exact figures of TREE: how probably it succeeds, why it fails, what it costs."""
-    from bbtc import artefacts
-    from bbtc.artefacts.figures_json import failing_run_to_json
-    from bbtc.artefacts.numbers import figure_text
     from bbtc.belief.scenarios import sample
     from bbtc.belief.scenarios import scenarios as runs
     from bbtc.cli.inputs import tree_of
@@ -67,10 +64,14 @@ def command(
     rest = figures.failure + figures.blocked - sum((each.run.probability for each in failed), Fraction(0))
     sampled = sample(chain, samples, seed, limits) if samples else None
     if as_json:
-        data = artefacts.figures_to_json(loaded, figures, listed, sampled)
+        from bbtc.artefacts.figures_json import failing_run_to_json, figures_to_json
+        from bbtc.artefacts.jsontext import dumps
+        from bbtc.artefacts.numbers import figure_text
+
+        data = figures_to_json(loaded, figures, listed, sampled)
         data["failing_runs"] = [failing_run_to_json(loaded, each) for each in failed]
         data["other_failing_runs"] = figure_text(rest)
-        session.write(output, artefacts.dumps(data))
+        session.write(output, dumps(data))
     else:
         lines = figures_report(loaded, figures)
         if sampled is not None:
