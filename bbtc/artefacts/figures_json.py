@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bbtc.artefacts.conditions import condition_to_json
 from bbtc.artefacts.numbers import figure_text
-from bbtc.belief.scenarios import Sampling, Scenario
-from bbtc.belief.simulate import Figures
 from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.kleene import Truth
-from bbtc.planner.failing_runs import FailingRun
 from bbtc.tree.nodes import Tree
+
+if TYPE_CHECKING:
+    from bbtc.belief.scenarios import Sampling, Scenario
+    from bbtc.belief.simulate import Figures
+    from bbtc.planner.failing_runs import FailingRun
 
 
 def figures_to_json(

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from bbtc.artefacts.numbers import exact
-from bbtc.belief.scenarios import Scenario
-from bbtc.belief.simulate import Figures
 from bbtc.belief.tick import NodeStatus
 from bbtc.cli.counting import counted
 from bbtc.ground.condition import Condition
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
-from bbtc.planner.failing_runs import FailingRun
-from bbtc.planner.result import Plan, Refinement
-from bbtc.planner.why_not import Block
 from bbtc.printable import printable
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree, retries_of, walk
+
+if TYPE_CHECKING:
+    from bbtc.belief.scenarios import Scenario
+    from bbtc.belief.simulate import Figures
+    from bbtc.planner.failing_runs import FailingRun
+    from bbtc.planner.result import Plan, Refinement
+    from bbtc.planner.why_not import Block
 
 _MOST_NAMED = 5  # actions named of many
 _MOST_BLOCKS = 3  # causes told of one run

@@ -13,10 +13,10 @@ import bbtc
 from bbtc.disturbance.perturbed import perturbed_runs
 from bbtc.limits import Limits
 from bbtc.replay.engines import BtcppReplay, PyTreesReplay, Replay
-from bbtc.replay.perturbed import perturbed_counts
 from bbtc.tree.nodes import Tree
 from tests.long_form import LONG, amount
 from tests.replay.all_engines import Compared
+from tests.replay.perturbed import perturbed_counts
 from tests.replay.random_trees import random_tree
 
 DOMAINS = Path(__file__).parents[2] / "domains"

@@ -77,9 +77,6 @@ def command(
     TREE carries along the actions that it uses. With a DOMAIN and PROBLEM, or a compiled TASK, that is
     what it is run in: then its other actions count, too, for what can change.
     """
-    from bbtc import artefacts
-    from bbtc.artefacts.figures_json import failing_run_to_json
-    from bbtc.artefacts.numbers import figure_text
     from bbtc.belief.scenarios import sample
     from bbtc.belief.scenarios import scenarios as listing
     from bbtc.cli.wording import failing_lines, figures_report
@@ -102,10 +99,14 @@ def command(
     if recovery:
         disturbed.recover(samples)
     if as_json:
-        data = artefacts.figures_to_json(loaded, figures, listed, sampled) | disturbed.data
+        from bbtc.artefacts.figures_json import failing_run_to_json, figures_to_json
+        from bbtc.artefacts.jsontext import dumps
+        from bbtc.artefacts.numbers import figure_text
+
+        data = figures_to_json(loaded, figures, listed, sampled) | disturbed.data
         data["failing_runs"] = [failing_run_to_json(loaded, each) for each in failed]
         data["other_failing_runs"] = figure_text(rest)
-        session.write(output, artefacts.dumps(data))
+        session.write(output, dumps(data))
     else:
         lines = figures_report(loaded, figures)
         if sampled is not None:
