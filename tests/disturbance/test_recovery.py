@@ -139,10 +139,21 @@ def test_the_command_writes_the_same(tmp_path: Path) -> None:
     assert f"recovery from all {few.states} states that its actions lead to" in text
 
 
-def test_more_states_than_allowed_are_a_limit(tmp_path: Path) -> None:
-    tree = bbtc.plan(*files("warehouse/one-order")).tree
+def test_more_states_than_allowed_are_a_limit_after_which_all_else_is_told(tmp_path: Path) -> None:
+    tree = bbtc.plan(*files("trolley/three-trays")).tree
     (tmp_path / "tree.json").write_text(bbtc.dumps(tree), "utf-8")
     with pytest.raises(bbtc.LimitReached):
-        bbtc.recovery(tree, limits=Limits(states=20))
+        bbtc.recovery(tree, limits=Limits(states=40))
+    options = ["--perturb", "5%", "--runs", "10", "--recovery", "--max-states", "40", "--json"]
+    run = program("simulate", tmp_path / "tree.json", *options)
+    assert run.returncode == 3
+    assert "the limit of 40 states" in run.stderr
+    data = json.loads(run.stdout)
+    assert Fraction(data["success"]) == tree.success_probability
+    assert data["perturbed"]["runs"] == 10
+    assert "recovery" not in data
+
+
+def test_less_than_one_sample_is_refused() -> None:
     with pytest.raises(ValueError):
-        bbtc.recovery(tree, samples=0)
+        bbtc.recovery(bbtc.plan(*files("warehouse/one-order")).tree, samples=0)
