@@ -131,6 +131,7 @@ class _Pairs:
 
     def __init__(self, task: Task) -> None:
         self.mates = [0] * len(task.variables)
+        self._some = 0  # all that may be true
         self._every = (1 << len(task.variables)) - 1
         for values in initial_belief(task):
             true = sum(1 << v for v, value in enumerate(values) if value == Truth.TRUE)
@@ -143,6 +144,7 @@ class _Pairs:
             fresh = other & ~self.mates[bit]
             if fresh:
                 news = True
+                self._some |= fresh | 1 << bit
                 self.mates[bit] |= fresh
                 for mate in set_bits(fresh):
                     self.mates[mate] |= 1 << bit
@@ -150,7 +152,7 @@ class _Pairs:
 
     def _possible(self, known: PartialState) -> int | None:
         """The bits of all that may be true with what is known to be; None if that cannot be."""
-        room = sum(1 << v for v, mates in enumerate(self.mates) if mates)
+        room = self._some
         true = known.value & self._every
         for bit in set_bits(true):
             room &= self.mates[bit]
