@@ -53,8 +53,8 @@ class _Way:
     parts: tuple[_Part, ...]
 
     def certain(self, known: PartialState) -> tuple[int, int]:
-        """The bits made true, and those of variables that are not true afterwards, in states that satisfy it:
-        also those that end if they are true at all."""
+        """The bits made true in states that satisfy it, and of the others those that are not true afterwards,
+        also where an effect ends them only if they are true."""
         makes = ends = 0
         for part in self.parts:
             lacking = part.when.mask & ~known.mask | (part.when.value ^ known.value) & part.when.mask
@@ -63,7 +63,7 @@ class _Way:
                 ends |= part.ends
             elif lacking & lacking - 1 == 0 and lacking & part.ends and lacking & part.when.value:
                 ends |= lacking
-        return makes, ends & ~makes
+        return makes, ends
 
 
 def exclusive_groups(task: Task, limits: Limits) -> list[Group]:
@@ -169,7 +169,6 @@ class _Pairs:
             room = self._possible(known)
             if room is not None:
                 makes, ends = way.certain(known)
-                makes |= part.makes
                 news |= self._join(makes, makes | room & ~ends)
         if len(making) > _MOST_PARTS:
             whole = 0

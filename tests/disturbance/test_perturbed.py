@@ -110,8 +110,11 @@ def test_without_changes_the_figures_are_those_of_the_exact_simulation() -> None
     found = bbtc.perturb(tree, 0, runs=20_000, seed=5)
     assert found.changes == found.unready == found.missed == 0
     assert found.interval.lower < exact.success < found.interval.upper
-    assert exact.cost is not None
-    assert abs(found.cost - exact.cost) < Fraction(1, 10)
+    for sampled, figure in ((found.cost, exact.cost), (found.cost_given_success, exact.cost_given_success)):
+        assert sampled is not None
+        assert figure is not None
+        assert abs(sampled - figure) < Fraction(1, 10)
+    assert exact.cost != exact.cost_given_success
 
 
 def test_a_longer_sample_begins_with_the_shorter_one_and_seeds_differ() -> None:
