@@ -115,7 +115,7 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     if figures.endless:
         lines.append(f"endless   {exact(figures.endless)}")
     for share in figures.failures:
-        what = _stopped(tree, share.node, share.condition, share.status)
+        what = stopped(tree, share.node, share.condition, share.status)
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")
     lines.append(f"cost      {expected(figures.cost, figures.cost_given_success)}")
     lines.append(f"actions   {expected(figures.actions, figures.actions_given_success)}")
@@ -128,7 +128,7 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     return lines
 
 
-def _stopped(tree: Tree, node: str, condition: Condition | None, status: NodeStatus) -> str:
+def stopped(tree: Tree, node: str, condition: Condition | None, status: NodeStatus) -> str:
     """What stopped a run at a node, in words."""
     if condition is not None:
         word = "unknown" if status is NodeStatus.RUNNING else "false"
@@ -152,7 +152,7 @@ def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> lis
             whys = [f"no action of the tree can bring about {lost}"]
         if not whys:
             node, condition = each.stop.node or tree.root.id, each.stop.condition
-            what = _stopped(tree, node, condition, status if each.stop.status is None else each.stop.status)
+            what = stopped(tree, node, condition, status if each.stop.status is None else each.stop.status)
             whys = [f"{what}, node {node}: the goal may be in reach, but the tree has nothing left to try"]
         lines.append(f"  {exact(each.run.probability)}{ending}: {whys[0]}")
         lines.extend(f"    and {why}" for why in whys[1:])
