@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -90,7 +89,9 @@ def missing(model: md.Model) -> Iterator[Diagnostic]:
         return
     for key, listed in model.requirements.items():
         if key not in _KNOWN:
-            near = difflib.get_close_matches(key, _KNOWN, 1, 0.75)
+            from difflib import get_close_matches
+
+            near = get_close_matches(key, _KNOWN, 1, 0.75)
             hint = f"did you mean `{near[0]}`?" if near else None
             severity = Severity.WARNING if near else Severity.NOTE
             yield Diagnostic(_CODE, f"`{key}` is no requirement that bbtc knows", listed, hint, severity)
