@@ -1,2 +1,1 @@
-"""Trees in worlds that others change: facts that move by chance, and starts in any state that can be
-reached."""
+"""Trees in worlds that others change: facts that move by chance, starts in any state that can be reached."""
