@@ -24,7 +24,7 @@ from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.intervals import Interval, score, wilson
-from bbtc.ground.condition import FALSE, Condition, compile_condition
+from bbtc.ground.condition import FALSE, Condition, compile_condition, conjunction, conjuncts, evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -193,6 +193,11 @@ def _in_reach(found: _Found, ends: Sequence[int]) -> set[int]:
     return {end for end in ends if found.best.bounds(row_of[found.chain.states[end].values]).upper}
 
 
+def _missing(condition: Condition, values: Values) -> Condition:
+    """The conjuncts of a condition that are not true in a state."""
+    return conjunction(part for part in conjuncts(condition) if evaluate(part, values) is not Truth.TRUE)
+
+
 def _given_up(task: Task, root: Node, chain: Chain, ends: dict[int, Fraction]) -> tuple[GivenUp, ...]:
     finder = FailureFinder(task, root)
     groups: dict[tuple[Condition | None, NodeStatus, bool], dict[int, str]] = {}
@@ -200,7 +205,8 @@ def _given_up(task: Task, root: Node, chain: Chain, ends: dict[int, Fraction]) -
         if share:
             stop = finder.stopped(chain.states[end])
             status = chain.status[end] if stop.status is None else stop.status
-            key = (stop.condition, status, stop.condition is None and stop.node is not None)
+            missing = None if stop.condition is None else _missing(stop.condition, chain.states[end].values)
+            key = (missing, status, missing is None and stop.node is not None)
             groups.setdefault(key, {})[end] = stop.node or root.id
     made = []
     for (condition, status, used_up), nodes in groups.items():

@@ -33,8 +33,8 @@ SMALL = ["doors/to-the-archive", "trolley/with-spares", "charging/one-room"]
 
 
 def domain_tree(problem: str, guarded: bool = False) -> Tree:
-    folder = problem.partition("/")[0]
-    return bbtc.plan(DOMAINS / folder / "domain.pddl", DOMAINS / f"{problem}.pddl", guarded=guarded).tree
+    domain = DOMAINS / problem.partition("/")[0] / "domain.pddl"
+    return bbtc.plan(domain, DOMAINS / f"{problem}.pddl", guarded=guarded, retries="least").tree
 
 
 def changes_of(task: Task) -> Changes:
