@@ -32,6 +32,7 @@ from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.maxprob import MaxProb, max_prob
 from bbtc.planner.mdp.packing import bit_test, holds
 from bbtc.planner.mdp.state_space import StateSpace
+from bbtc.planner.mdp.state_table import StateTable
 from bbtc.tree.nodes import Node
 
 ALL_UP_TO = 10_000
@@ -189,8 +190,12 @@ def _figures(task: Task, root: Node, limits: Limits, found: _Found) -> Recovery:
 
 def _in_reach(found: _Found, ends: Sequence[int]) -> set[int]:
     """Those of some final states of the chain from which the goal is in reach."""
-    row_of = {values: row for row, values in enumerate(_values(found.space, range(len(found.space.states))))}
-    return {end for end in ends if found.best.bounds(row_of[found.chain.states[end].values]).upper}
+    table = StateTable(found.space.packing.words)
+    table.number(found.space.states)
+    packing = found.space.packing
+    packed = packing.split(packing.pack(found.chain.states[end].values) for end in ends)
+    rows = table.number(packed).tolist()
+    return {end for end, row in zip(ends, rows, strict=True) if found.best.bounds(row).upper}
 
 
 def _missing(condition: Condition, values: Values) -> Condition:
