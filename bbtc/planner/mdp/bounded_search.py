@@ -43,6 +43,9 @@ SMALLEST_STEP = 256
 _MOST_GUIDED = 100_000
 """States expanded one policy after the other; with more, batches are faster."""
 
+_LONG_WITHOUT = 1_000
+"""States after whose expansion a search looks for any way to the goal at all, if there is no policy yet."""
+
 _LATE = 0.5  # seconds for a last solution once the time is over
 _FEW = 50_000  # states that are solved within such a time
 _SHARE = 4  # else this part of those expanded before
@@ -131,7 +134,7 @@ class _Search:
         guided = Guided(self._found, self._probabilities, [state for _, state in self.explorer.initial])
         self.guided = guided
         guided.note(self.guess.tolist(), self.explorer.goal().tolist())
-        settled = False
+        settled = probed = False
         while not settled and not self._done(self.solved.bounds) and self.expanded < _MOST_GUIDED:
             until = max(self.step, 2 * self.expanded)
 
@@ -139,7 +142,10 @@ class _Search:
                 self.limits.check_time("the search for the best probability", self.explorer.count)
                 return self.expanded < until
 
-            settled = guided.run(more)
+            if self.expanded >= _LONG_WITHOUT and not self.solved.bounds.lower and not probed:
+                probed = guided.probe(more)
+            else:
+                settled = guided.run(more)
             self.solved = self._solve()
 
     def _found(self, states: list[int]) -> Choices:

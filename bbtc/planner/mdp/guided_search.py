@@ -14,6 +14,7 @@ Values here are floats and only guide; :mod:`bbtc.planner.mdp.bounded_search` pr
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,7 @@ from bbtc.planner.mdp.explore import Choices
 _EQUAL = 1e-12  # values closer than this count as equal
 _REST = 1e-11  # values that move by less are at rest
 _SWEEPS = 200  # backups of a set of states in one visit, at most
+_AT_ONCE = 16  # states expanded at a time by :meth:`Guided.probe`
 _FAR = 1e4  # what a dead end counts as, in actions
 
 Expand = Callable[[list[int]], Choices]
@@ -84,6 +86,24 @@ class Guided:
                 tips = self._ahead(tips)
             if not more():
                 return False
+
+    def probe(self, more: Callable[[], bool]) -> bool:
+        """Expand what the heuristic thinks closest to the goal, whatever the policy is, until a state
+        of the goal is found (then the result is True), nothing is left, or ``more`` says that it is enough."""
+        known = 0
+        heap: list[tuple[float, int]] = []
+        while more():
+            for state in range(known, len(self.value)):
+                if not self.settled[state]:
+                    if state not in self.nodes and state not in self._merged:
+                        heapq.heappush(heap, (self.guess[state], state))
+                elif known and self.value[state]:
+                    return True
+            known = len(self.value)
+            if not heap:
+                break
+            self._open([heapq.heappop(heap)[1] for _ in range(min(_AT_ONCE, len(heap)))])
+        return False
 
     # --- states ----------------------------------------------------------------------------------
 
