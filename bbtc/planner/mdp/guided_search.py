@@ -88,8 +88,8 @@ class Guided:
                 return False
 
     def probe(self, more: Callable[[], bool]) -> bool:
-        """Expand what the heuristic thinks closest to the goal, whatever the policy is, until a state
-        of the goal is found (then the result is True), nothing is left, or ``more`` says that it is enough."""
+        """Expand what the heuristic thinks closest to the goal, whatever the policy is, until a state of the
+        goal is found (then the result is True), nothing is left, or ``more`` says that it is enough."""
         known = 0
         heap: list[tuple[float, int]] = []
         while more():
