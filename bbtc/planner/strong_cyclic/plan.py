@@ -21,9 +21,12 @@ from bbtc.planner.strong_cyclic.solve import Hopeless, Solved, Solver
 from bbtc.rewrite.simplify import numbered, size
 from bbtc.tree.nodes import ConditionNode, Node, PlanStatus
 
-_FEW_STATES = 2_000
+_FEW_STATES = 200
 """A tree with so many states is simulated in all of them; one with more, in as many as differ in what
 matters."""
+
+_FOR_SHORT = 0.6
+"""Of the time left, what may be spent on the short tree while there is none."""
 
 
 def plan_strong_cyclic(
@@ -57,19 +60,24 @@ def plan_strong_cyclic(
 
 
 def _keep(best: BestTree, solver: Solver, solved: Solved, limits: Limits) -> None:
-    """The smallest tree of the policy that is shown to succeed always."""
+    """A tree of the policy that is shown to succeed always: the short one, else the plain one."""
     rules = Rules(solver.model, solver.exclusion, solved, limits)
+    try:
+        if _keep_if_sure(best, solver, rules.short(), limits.part(_FOR_SHORT)):
+            return
+    except LimitReached:
+        limits.check_time("the search for a small tree")
     _keep_if_sure(best, solver, rules.plain(), limits)
-    _keep_if_sure(best, solver, rules.short(), limits)
 
 
-def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits: Limits) -> None:
+def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits: Limits) -> bool:
     root = tree_of(solver.task, solver.model, rules)
     limits.check_nodes(size(root))
     chain = chain_of(solver, root, limits)
     success = success_of(chain)
     if success == 1:
         best.take(root, chain, success)
+    return success == 1
 
 
 def chain_of(solver: Solver, root: Node, limits: Limits) -> Chain:

@@ -44,6 +44,20 @@ class _Index:
             found.extend(number for mask, value, number in self.under[bit] if state & mask == value)
         return found
 
+    def entailed(self, partial: PartialState) -> list[int]:
+        """The numbers of those that a partial state entails."""
+        known = partial.mask
+        return [
+            number
+            for mask, value, number in self._near(partial.value)
+            if known & mask == mask and partial.value & mask == value
+        ]
+
+    def _near(self, state: int) -> Iterator[tuple[int, int, int]]:
+        yield from self.other
+        for bit in set_bits(state & self.bits):
+            yield from self.under[bit]
+
 
 class Forbidden:
     """Pairs of partial state and action that a policy must not use: the action may lead to a dead end."""
@@ -83,6 +97,8 @@ class Policy:
     def __init__(self, forbidden: Forbidden) -> None:
         self.forbidden = forbidden
         self.pairs: list[Pair] = []
+        self.kept: set[int] = set()
+        """The numbers of those that have not been dropped."""
         self._known: dict[tuple[PartialState, int], int] = {}
         self._index = _Index()
 
@@ -94,7 +110,17 @@ class Policy:
             return
         self._known[key] = len(self.pairs)
         self._index.add(len(self.pairs), pair.partial)
+        self.kept.add(len(self.pairs))
         self.pairs.append(pair)
+
+    def keep(self, numbers: set[int]) -> None:
+        """Drop all others."""
+        self.kept = numbers
+        self._known, self._index = {}, _Index()
+        for number in sorted(numbers):
+            pair = self.pairs[number]
+            self._known[pair.partial, pair.action] = number
+            self._index.add(number, pair.partial)
 
     def order(self, number: int) -> tuple[int, int]:
         """Sort key of a pair, the first to follow first."""
@@ -112,7 +138,7 @@ class Policy:
 
     def __iter__(self) -> Iterator[int]:
         """The numbers of the pairs, in the order in which they are followed."""
-        return iter(sorted(range(len(self.pairs)), key=self.order))
+        return iter(sorted(self.kept, key=self.order))
 
 
 class Covers:
@@ -126,6 +152,10 @@ class Covers:
         """One more."""
         self._index.add(len(self.partials), partial)
         self.partials.append(partial)
+
+    def entailed(self, partial: PartialState) -> list[int]:
+        """The numbers of those that a partial state entails."""
+        return self._index.entailed(partial)
 
     def number(self, state: int) -> int | None:
         """The number of the first of them that a state satisfies."""

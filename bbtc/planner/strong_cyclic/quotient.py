@@ -109,16 +109,17 @@ class _Ticks:
         self._order = {node.id: index for index, node in enumerate(self.nodes)}
         self._numbers = {action.name: number for number, action in enumerate(task.actions)}
         self._root = self._compiled(root)
-        self._last: tuple[int, int, PartialState] = (-1, 0, ANY_STATE)
+        self._ticked: dict[int, tuple[int, PartialState]] = {}
 
     # --- decisions ----------------------------------------------------------------------------
 
     def tick(self, state: int) -> tuple[int, PartialState]:
         """What the root returns, or ``STARTED`` and more, and what was read."""
-        if self._last[0] != state:
+        found = self._ticked.get(state)
+        if found is None:
             known = _Known(self.exclusion)
-            self._last = state, self._root(state, known), known.read
-        return self._last[1:]
+            found = self._ticked[state] = self._root(state, known), known.read
+        return found
 
     def final(self, state: int) -> PartialState | None:
         """What was read, where no action is started."""
@@ -143,6 +144,13 @@ class _Ticks:
             how = reasons.why if satisfied(test, state) else reasons.why_not
             found = united(found, how(test, state, found.mask))
         return found
+
+    def alone(self, state: int, choice: int, known: PartialState) -> PartialState:  # noqa: ARG002
+        """What was read of a state settles what a tree does."""
+        return known
+
+    def note(self, choice: int, needed: PartialState) -> None:
+        """What matters here is that runs are the same."""
 
     def blame(self, state: int, choice: int, step: Step, dead: int) -> None:
         """Trees have no dead ends: where nothing is started is final."""

@@ -36,12 +36,12 @@ from bbtc.planner.strong_cyclic.partial_state import (
     as_conditions,
     contains,
     contradict,
-    entails,
     literals,
     satisfied,
     united,
     without,
 )
+from bbtc.planner.strong_cyclic.policy import Covers
 from bbtc.planner.strong_cyclic.solve import Solved
 from bbtc.rewrite.simplify import numbered
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
@@ -167,34 +167,41 @@ class Rules:
     def _merged(self, rules: Sequence[Rule]) -> list[Rule]:
         """Rules of one action together, the later ones moved before others that apply elsewhere only."""
         found: list[Rule] = []
+        where: list[list[PartialState]] = []
+        last: dict[int, int] = {}
         for rule in rules:
-            at = len(found) - 1
-            while at >= 0 and found[at].action != rule.action and self._apart(found[at], rule):
-                at -= 1
-            if at >= 0 and found[at].action == rule.action:
-                found[at] = Rule(self._joined((*found[at].guards, *rule.guards)), rule.action)
+            own = self._where(rule)
+            at = last.get(rule.action, -1)
+            if at >= 0 and all(_apart(where[other], own) for other in range(len(found) - 1, at, -1)):
+                found[at] = Rule((*found[at].guards, *rule.guards), rule.action)
+                where[at] = where[at] + own
             else:
+                last[rule.action] = len(found)
                 found.append(rule)
-        return found
-
-    def _apart(self, one: Rule, other: Rule) -> bool:
-        return all(contradict(own, its) for own in self._where(one) for its in self._where(other))
+                where.append(own)
+        return [Rule(_joined(rule.guards), rule.action) for rule in found]
 
     def _where(self, rule: Rule) -> list[PartialState]:
         """What holds for sure where a rule applies, for each of its guards."""
         needs = self.model.actions[rule.action].common
         return [self.exclusion.closed(united(needs, guard.partial)) for guard in rule.guards]
 
-    def _joined(self, guards: Sequence[Guard]) -> tuple[Guard, ...]:
-        found: list[Guard] = []
-        for guard in guards:
-            if any(
-                entails(guard.partial, each.partial) and set(each.excluded) <= set(guard.excluded)
-                for each in found
-            ):
-                continue
+
+def _apart(one: Sequence[PartialState], other: Sequence[PartialState]) -> bool:
+    return all(contradict(own, its) for own in one for its in other)
+
+
+def _joined(guards: Sequence[Guard]) -> tuple[Guard, ...]:
+    """Guards without those that hold only where one before them does."""
+    found: list[Guard] = []
+    general = Covers()
+    for guard in dict.fromkeys(guards):
+        if not any(
+            set(found[number].excluded) <= set(guard.excluded) for number in general.entailed(guard.partial)
+        ):
             found.append(guard)
-        return tuple(found)
+            general.add(guard.partial)
+    return tuple(found)
 
 
 # --- the tree ---------------------------------------------------------------------------------

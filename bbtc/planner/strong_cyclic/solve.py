@@ -23,12 +23,13 @@ from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import (
     PartialState,
     contains,
+    entails,
     satisfied,
     united,
 )
 from bbtc.planner.strong_cyclic.policy import Forbidden, Pair, Policy
 from bbtc.planner.strong_cyclic.relaxation import Relaxation
-from bbtc.planner.strong_cyclic.visit import Visit
+from bbtc.planner.strong_cyclic.visit import Node, Visit
 from bbtc.planner.strong_cyclic.weak_plan import Exhausted, Searcher, Taken, WeakPlan
 
 
@@ -68,12 +69,18 @@ class Solver:
         """Does every pair say why no later action of its plan is forbidden?"""
         self.initial = [self.model.packing.pack(values) for values in initial_belief(task)]
         self.rounds = 0
+        self._proven: set[int] = set()
+        """The pairs that, wherever they are followed, lead to explained states by what was seen in this
+        round. All are trusted to be, until a round does not bear it out: then they are doubted."""
+        self._doubted: set[int] = set()
+        self._doubts: list[tuple[int, int]] = []
 
     def run(self) -> Answer:
         """Rounds until one changes nothing. Raises ``LimitReached``."""
         while True:
             self.rounds += 1
             forbidden, pairs = self.forbidden.count, len(self.policy.pairs)
+            self._proven = set()
             visit = Visit(self)
             for state in self.initial:
                 if not visit.all_from(state):
@@ -81,21 +88,49 @@ class Solver:
             if self.forbidden.count != forbidden:
                 self._afresh()
             elif len(self.policy.pairs) == pairs:
-                if not visit.trapped:
+                used = {node.choice for node in visit.nodes.values() if node.why_final is None}
+                if self._doubt(used - self._proven):
+                    continue
+                if not visit.trapped and (self.strict or used <= self._doubted or self._closer(visit)):
+                    self.policy.keep(used)
                     return self._solved(visit)
                 if self.strict:
                     raise AssertionError("a policy whose pairs lead ever closer to the goal is trapped")
                 self.strict = True
                 self._afresh()
 
+    def _doubt(self, pairs: set[int]) -> bool:
+        """Some pairs were not settled; True if they were trusted to be."""
+        wrong = pairs - self._doubted
+        if wrong:
+            self._doubted |= wrong
+            self._doubts = sorted(map(self.policy.order, self._doubted))
+        return bool(wrong)
+
     def _afresh(self) -> None:
         """Forget the policy, now that more is forbidden: it might lead there in roundabout ways."""
         self.policy = Policy(self.forbidden)
+        self._doubted, self._doubts = set(), []
         self.searcher.forget()
 
+    def _closer(self, visit: Visit) -> bool:
+        """Does every choice lead closer to the goal by one of its steps, whatever settled pair is followed
+        on the way?"""
+
+        def distance(node: Node) -> int:
+            return 0 if node.why_final is not None else self.policy.pairs[node.choice].distance
+
+        return all(
+            any(
+                distance(visit.nodes[visit.representative(target)]) < distance(node)
+                for _, target in node.edges
+            )
+            for node in visit.nodes.values()
+            if node.why_final is None
+        )
+
     def _solved(self, visit: Visit) -> Solved:
-        used = {node.choice for node in visit.nodes.values() if node.why_final is None}
-        pairs = tuple(self.policy.pairs[number] for number in self.policy if number in used)
+        pairs = tuple(self.policy.pairs[number] for number in self.policy)
         return Solved(pairs, self.forbidden, tuple(visit.nodes))
 
     # --- what a visit asks ----------------------------------------------------------------------
@@ -169,19 +204,32 @@ class Solver:
     # --- why ------------------------------------------------------------------------------------
 
     def why(self, state: int, choice: int) -> PartialState:
-        """Enough for the policy to start the same action as by a pair in a state."""
+        """Enough for a pair to apply, and its action not to be forbidden."""
         pair = self.policy.pairs[choice]
-        found = self._allowed(pair.partial, state, pair.action)
-        last = self.policy.order(choice)
+        return self._allowed(pair.partial, state, pair.action)
+
+    def alone(self, state: int, choice: int, known: PartialState) -> PartialState:
+        """With enough for no doubted pair of another action to come before a pair."""
+        pair, last = self.policy.pairs[choice], self.policy.order(choice)
         against: list[PartialState] = []
-        for number, other in enumerate(self.policy.pairs):
-            if other.action == pair.action or self.policy.order(number) > last:
+        for order in self._doubts:
+            if order >= last:
+                break
+            other = self.policy.pairs[order[1]]
+            if other.action == pair.action:
                 continue
             if not contains(other.partial, state):
                 against.append(other.partial)
                 continue
             reason = self.forbidden.forbids(state, other.action)
             if reason is not None:
-                found = united(found, reason)
+                known = united(known, reason)
             # Else it was added since the state was decided: this round is not the last one.
-        return self.exclusion.refuting(self.model.reasons, against, state, found)
+        return self.exclusion.refuting(self.model.reasons, against, state, known)
+
+    def note(self, choice: int, needed: PartialState) -> None:
+        """A pair is settled if what it needs implies what its steps need."""
+        if choice not in self._proven and entails(
+            self.exclusion.closed(self.policy.pairs[choice].partial), needed
+        ):
+            self._proven.add(choice)

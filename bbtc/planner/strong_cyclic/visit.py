@@ -2,8 +2,8 @@
 
 States are visited depth first. When all states that some states lead to are done, each of them is
 explained: what of it is enough for the same actions to be started from there on, whatever their outcomes.
-Any other state that satisfies such an explanation, by a run of the same actions and outcomes, gets to
-states that satisfy the explanations of those this one gets to; so it need not be visited.
+Any other state that satisfies such an explanation, by the same action and outcomes, gets to states that
+satisfy the explanations of those this one gets to; so it need not be visited.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Protocol
 from bbtc.limits import Limits
 from bbtc.planner.strong_cyclic.determinised import Determinised, Step
 from bbtc.planner.strong_cyclic.exclusion import Exclusion
-from bbtc.planner.strong_cyclic.partial_state import PartialState, united
+from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, united
 from bbtc.planner.strong_cyclic.policy import Covers
 
 
@@ -38,7 +38,16 @@ class Decisions(Protocol):
         ...
 
     def why(self, state: int, choice: int) -> PartialState:
-        """Enough for the same action to be started as in a state."""
+        """Enough for the same action to be started as in a state, but for what :meth:`alone` adds."""
+        ...
+
+    def alone(self, state: int, choice: int, known: PartialState) -> PartialState:
+        """``known``, which holds in a state, with enough for nothing to be decided there but this choice, or
+        others whose steps lead to explained states wherever they are taken."""
+        ...
+
+    def note(self, choice: int, needed: PartialState) -> None:
+        """Where a choice is taken and ``needed`` holds, its steps lead to explained states."""
         ...
 
     def blame(self, state: int, choice: int, step: Step, dead: int) -> None:
@@ -151,30 +160,46 @@ class Visit:
         self._explain(members)
 
     def _explain(self, members: list[Node]) -> None:
-        for node in members:
-            if node.why is None:
-                node.why = self.decisions.why(node.state, node.choice)
-        moved = True
-        while moved:
-            moved = False
-            for node in reversed(members):
-                found = node.why
-                assert found is not None
-                for step, target in node.edges:
-                    known = self.nodes.get(target)
-                    ahead = self.explained.partials[self._owned(target)] if known is None else known.why
-                    if ahead is not None:  # else it has a dead end among those around it
-                        found = united(found, self.model.before(step, node.state, ahead, found.mask))
-                if found != node.why:
-                    node.why, moved = found, len(members) > 1
+        taken = [node for node in members if node.why_final is None]
+        for node in taken:
+            node.why = self.decisions.why(node.state, node.choice)
+        self._spread(members)
+        for node in taken:
+            assert node.why is not None
+            node.why = self.decisions.alone(node.state, node.choice, node.why)
+        self._spread(members)
         for node in members:
             assert node.why is not None
             node.why = self.exclusion.shortest(node.why)
             self.explained.add(node.why)
             self.owners.append(node.state)
+        for node in taken:
+            self.decisions.note(node.choice, self._before(node, ANY_STATE))
 
-    def _owned(self, target: int) -> int:
-        found = self.explained.number(target)
+    def _spread(self, members: list[Node]) -> None:
+        """What is needed of states for those that they lead to to be explained."""
+        moved = True
+        while moved:
+            moved = False
+            for node in reversed(members):
+                assert node.why is not None
+                found = self._before(node, node.why)
+                if found != node.why:
+                    node.why, moved = found, len(members) > 1
+
+    def _before(self, node: Node, known: PartialState) -> PartialState:
+        """``known`` with enough for the steps of a state to lead to explained ones."""
+        for step, target in node.edges:
+            ahead = self._ahead(target)
+            if ahead is not None:  # else it has a dead end among those around it
+                known = united(known, self.model.before(step, node.state, ahead, known.mask))
+        return known
+
+    def _ahead(self, target: int) -> PartialState | None:
+        known = self.nodes.get(target)
+        if known is not None:
+            return known.why
+        found = self.explained.first(target)
         assert found is not None
         return found
 
