@@ -21,6 +21,7 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Protocol
 
 import numpy as np
 
@@ -30,8 +31,6 @@ from bbtc.limits import Limits
 from bbtc.planner.mdp.explore import Choices, Explorer
 from bbtc.planner.mdp.graph import Floats, Graph, draw_probabilities, sums
 from bbtc.planner.mdp.guided_search import Guided
-from bbtc.planner.mdp.h_add import Costs, Relaxation
-from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.h_add import Costs, Relaxation
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.packing import Flags
@@ -55,6 +54,18 @@ _OFTEN = 100  # solutions in which the expanded states did not become twice as m
 _LEAST_SHARE = 16  # at least this part of them is expanded
 _FAR = 1e4  # what a dead end counts as, in actions
 _SWEEPS = 100  # steps for which runs of the optimistic policy are followed
+
+
+class Advice(Protocol):
+    """What is known of a task before a search. States are packed to integers, actions numbered."""
+
+    def decide(self, state: int) -> int | None:
+        """The action to try first, if there is one."""
+        ...
+
+    def forbids(self, state: int, action: int) -> bool:
+        """May an action lead to a state from which nothing is sure any more? It is tried last."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,19 +104,28 @@ def search_bounds(
     target: Fraction | None = None,
     *,
     verdict: bool = False,
+    advice: Advice | None = None,
     step: int = SMALLEST_STEP,
 ) -> Searched:
     """Search until the bounds on P* have met, or a policy reaches the target, or a limit is met; with
-    ``verdict``, also once no policy can reach the target. At least ``step`` states are expanded at a time.
-    Raises ``LimitReached`` only if the time is over before anything was found."""
-    return _Search(task, limits, target, verdict=verdict, step=step).run()
+    ``verdict``, also once no policy can reach the target. ``advice`` is followed first. At least ``step``
+    states are expanded at a time. Raises ``LimitReached`` only if the time is over before it begins."""
+    return _Search(task, limits, target, advice, verdict=verdict, step=step).run()
 
 
 class _Search:
     def __init__(
-        self, task: Task, limits: Limits, target: Fraction | None, *, verdict: bool, step: int
+        self,
+        task: Task,
+        limits: Limits,
+        target: Fraction | None,
+        advice: Advice | None,
+        *,
+        verdict: bool,
+        step: int,
     ) -> None:
-        self.limits, self.target, self.verdict, self.step = limits, target, verdict, step
+        self.limits, self.target, self.advice = limits, target, advice
+        self.verdict, self.step = verdict, step
         self.explorer = Explorer(task, limits)
         self.heuristic = Relaxation(task, limits, count_actions=True)
         self.probability: list[float] = []
@@ -133,7 +153,8 @@ class _Search:
 
     def _guided(self) -> None:
         """Expand what a depth-first search for a policy visits."""
-        guided = Guided(self._found, self._probabilities, [state for _, state in self.explorer.initial])
+        initial = [state for _, state in self.explorer.initial]
+        guided = Guided(self._found, self._probabilities, initial, self._ranks)
         self.guided = guided
         guided.note(self.guess.tolist(), self.explorer.goal().tolist())
         settled = probed = False
@@ -158,6 +179,21 @@ class _Search:
             done += self._expand(np.array(states[done:], dtype=np.int64))
         self.guided.note(self.guess[known:].tolist(), self.explorer.goal()[known:].tolist())
         return self.explorer.since(mark)
+
+    def _ranks(self, found: Choices) -> list[int]:
+        """How little choices are advised."""
+        advice = self.advice
+        if advice is None:
+            return [0] * len(found.owner)
+        ranks: list[int] = []
+        last, bits, advised = -1, 0, None
+        for owner, action in zip(found.owner.tolist(), found.action.tolist(), strict=True):
+            if owner != last:
+                row = self.explorer.table.states[owner].astype("<u8")
+                last, bits = owner, int.from_bytes(row.tobytes(), "little")
+                advised = advice.decide(bits)
+            ranks.append(0 if action == advised else 2 if advice.forbids(bits, action) else 1)
+        return ranks
 
     def _batches(self) -> None:
         """Expand whole batches, until the bounds have met."""

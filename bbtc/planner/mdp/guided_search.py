@@ -29,14 +29,18 @@ _FAR = 1e4  # what a dead end counts as, in actions
 Expand = Callable[[list[int]], Choices]
 """Expand states, given in order; tells what was found."""
 
+Rank = Callable[[Choices], list[int]]
+"""For each choice, how little it is advised: of choices that seem as good, those with the least are taken."""
+
 
 @dataclass(slots=True)
 class _Node:
-    """An expanded state, or several that are merged: for each choice, probabilities and successors, and a
-    bound on its value; ``chosen`` is the choice that is followed."""
+    """An expanded state, or several that are merged: for each choice, probabilities and successors, a bound
+    on its value, and its rank; ``chosen`` is the choice that is followed."""
 
     choices: list[tuple[tuple[float, ...], tuple[int, ...]]]
     bounds: list[float]
+    ranks: list[int]
     chosen: int = -1
 
 
@@ -56,9 +60,14 @@ class Guided:
     """The search. States are numbered by what expands them."""
 
     def __init__(
-        self, expand: Expand, probability: Callable[[], Sequence[float]], initial: Sequence[int]
+        self,
+        expand: Expand,
+        probability: Callable[[], Sequence[float]],
+        initial: Sequence[int],
+        rank: Rank,
     ) -> None:
         self._expand, self._probability, self.initial = expand, probability, initial
+        self._rank = rank
         self.value: list[float] = []
         self.guess: list[float] = []
         self.settled = bytearray()
@@ -123,13 +132,15 @@ class Guided:
         tips.sort()
         found = self._expand(tips)
         for tip in tips:
-            self.nodes[tip] = _Node([], [])
+            self.nodes[tip] = _Node([], [], [])
         probability = self._probability()
         weights = [probability[draw] for draw in found.draw.tolist()]
         successors = found.successor.tolist()
         at = 0
-        for owner, count in zip(found.owner.tolist(), found.edges.tolist(), strict=True):
+        ranks = self._rank(found)
+        for owner, count, rank in zip(found.owner.tolist(), found.edges.tolist(), ranks, strict=True):
             node = self.nodes[owner]
+            node.ranks.append(rank)
             node.choices.append((tuple(weights[at : at + count]), tuple(successors[at : at + count])))
             node.bounds.append(1.0)
             at += count
@@ -177,6 +188,10 @@ class Guided:
                 total += weight * (self.guess[after] if self.value[after] else _FAR)
         return (1 + total) / max(_EQUAL, 1 - stays)
 
+    def _order(self, state: int, node: _Node, number: int) -> tuple[int, float, int]:
+        """Sort key of a choice, the first to take first."""
+        return node.ranks[number], self._distance(state, node.choices[number]), number
+
     def _backup(self, state: int) -> bool:
         """Set a state's value to that of its best choice; has anything changed?"""
         node = self.nodes[state]
@@ -191,7 +206,7 @@ class Guided:
             top = max(bounds)
             if chosen < 0 or bounds[chosen] < top - _EQUAL:
                 equal = [number for number, bound in enumerate(bounds) if bound >= top - _EQUAL]
-                chosen = min(equal, key=lambda each: (self._distance(state, node.choices[each]), each))
+                chosen = min(equal, key=lambda each: self._order(state, node, each))
             value = self._evaluate(state, node.choices[chosen])
             if value >= bounds[chosen] - _EQUAL:
                 break
@@ -291,13 +306,14 @@ class Guided:
         """Make one state of a trap."""
         root = members[0]
         inside = set(members)
-        node = _Node([], [])
+        node = _Node([], [], [])
         for state in members:
             old = self.nodes[state]
-            for choice, bound in zip(old.choices, old.bounds, strict=True):
+            for choice, bound, rank in zip(old.choices, old.bounds, old.ranks, strict=True):
                 if any(self._of(after) not in inside for after in choice[1]):
                     node.choices.append(choice)
                     node.bounds.append(bound)
+                    node.ranks.append(rank)
         for state in members[1:]:
             self._merged[state] = root
             del self.nodes[state]

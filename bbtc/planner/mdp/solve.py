@@ -10,7 +10,7 @@ from fractions import Fraction
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.planner.mdp.bounded_search import search_bounds
+from bbtc.planner.mdp.bounded_search import Advice, search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
@@ -48,10 +48,12 @@ def best_known(
     whole: bool = False,
     costs: bool = False,
     verdict: bool = False,
+    advice: Advice | None = None,
 ) -> Best:
     """Bounds on P* that meet if the limits allow it. With a ``target``, where the space is too large to be
     explored, a policy that reaches it is enough; with ``verdict``, to know whether there is one. ``costs``
-    asks for the whole space, if the limits allow it, so that the least cost can be told.
+    asks for the whole space, if the limits allow it, so that the least cost can be told. ``advice`` is what
+    a search follows first.
 
     Raises ``LimitReached`` only if the time is over before anything was found, or with ``whole`` if
     the limits do not allow to explore the whole space.
@@ -65,7 +67,7 @@ def best_known(
         assert space.stop is not None
         raise LimitReached([space.stop])
     del space  # two of them may be too much
-    searched = search_bounds(task, limits, target, verdict=verdict)
+    searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
     return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
 
 

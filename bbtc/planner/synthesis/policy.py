@@ -18,6 +18,7 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.finish import GRACE, finish
+from bbtc.planner.mdp.bounded_search import Advice
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb
 from bbtc.planner.mdp.solve import best_known, best_within
 from bbtc.planner.options import DEFAULTS, Options
@@ -54,6 +55,7 @@ class _Search:
     options: Options
     best: BestTree
     whole: bool = False
+    advice: Advice | None = None
     found: MaxProb | None = None
     bounds: Bounds = field(default_factory=lambda: Bounds(Fraction(0), Fraction(1)))
     stop: Diagnostic | None = None
@@ -73,7 +75,8 @@ class _Search:
         self._fall_back()
 
     def _without_end(self) -> None:
-        best = best_known(self.task, self.limits.part(_BEFORE_TREE), self.target, whole=self.whole)
+        limits = self.limits.part(_BEFORE_TREE)
+        best = best_known(self.task, limits, self.target, whole=self.whole, advice=self.advice)
         self.found = best.found
         self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
         limits = self.limits.within(GRACE) if best.interrupted else self.limits
@@ -149,13 +152,14 @@ def plan_policy(
     options: Options = DEFAULTS,
     *,
     whole: bool = False,
+    advice: Advice | None = None,
 ) -> Plan:
     """Plan by policy synthesis. Always returns; where a limit is reached, with the best that is known
-    by then. Only with ``whole`` it raises ``LimitReached`` instead where the task has more states than
-    the limit."""
+    by then. ``advice`` is what a search follows first. Only with ``whole`` it raises ``LimitReached`` instead
+    where the task has more states than the limit."""
     goal: Node = numbered(ConditionNode("", task.goal))
     search = _Search(
-        task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole
+        task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole, advice
     )
     search.run()
     if whole and search.stop is not None:
