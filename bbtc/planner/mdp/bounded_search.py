@@ -244,6 +244,8 @@ class _Search:
                 bounds = Bounds(low, max(low, min(bounds.upper, upper)))
         except LimitReached:
             pass
+        except KeyboardInterrupt:
+            return Searched(lower, bounds, None, interrupted=True)
         return Searched(lower, bounds, stop)
 
     # --- what to expand --------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.state_space import StateSpace
 
-FEW_STATES = 20_000
+FEW_STATES = 100_000
 """A space with no more is explored as a whole."""
 
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space

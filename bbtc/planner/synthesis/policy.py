@@ -41,6 +41,7 @@ from bbtc.tree.nodes import ConditionNode, Node
 _BEFORE_TREE = 0.6  # of the time, for all that comes before a tree
 _FOR_COST = 0.5  # of the time left, to find the cheapest policy
 _LARGE = 1000  # states; of a larger policy, a tree is made fast first
+_ENOUGH = 1000  # states that the simulation of what is fallen back on may have, whatever the limit
 _DRAFTS = (1000, 50)  # states of a policy that a tree is made of, if one of all has too many nodes
 _CLOSE = Fraction(1, 10**8)  # probabilities closer than this differ by rounding
 
@@ -103,14 +104,18 @@ class _Search:
         found = self.found
         if found is None or self._is_reached(found):
             return
+        # The tree visits no state that was not found, but those may be a few more than the limit, and so may
+        # what is worked out of an action.
+        few = replace(self.limits, states=max(self.limits.states, len(found.space.states), _ENOUGH))
         try:
             way = likely_way(found)
             if way is not None and not self.best.success:
                 # It is small, and so there is always time for it.
-                self._draft(way, replace(self.limits, seconds=None, until=None))
+                self._draft(way, replace(few, seconds=None, until=None))
+            limits = few.overtime(GRACE)
             for policy in (one_policy(found), *(likely_policy(found, most) for most in _DRAFTS)):
                 if policy is not None and not self._is_reached(found):
-                    self._draft(policy, self.limits.overtime(GRACE))
+                    self._draft(policy, limits)
         except KeyboardInterrupt:
             self.interrupted = True
 
