@@ -44,7 +44,7 @@ STRATEGIES = ("policy", "strong-cyclic")
 def searched(monkeypatch: pytest.MonkeyPatch) -> None:
     """No space is small enough to be explored as a whole, and no policy for its tree to come last."""
     monkeypatch.setattr(solve, "FEW_STATES", 2)
-    monkeypatch.setattr(policy, "_LARGE", 2)
+    monkeypatch.setattr(policy, "LARGE_POLICY", 2)
 
 
 def is_written(of: Task, plan: Plan) -> None:

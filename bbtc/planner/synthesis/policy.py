@@ -40,7 +40,9 @@ from bbtc.tree.nodes import ConditionNode, Node
 
 _BEFORE_TREE = 0.6  # of the time, for all that comes before a tree
 _FOR_COST = 0.5  # of the time left, to find the cheapest policy
-_LARGE = 1000  # states; of a larger policy, a tree is made fast first
+LARGE_POLICY = 1000
+"""States; of a larger policy, a tree is made fast first."""
+
 _ENOUGH = 1000  # states that the simulation of what is fallen back on may have, whatever the limit
 _DRAFTS = (1000, 50)  # states of a policy that a tree is made of, if one of all has too many nodes
 _CLOSE = Fraction(1, 10**8)  # probabilities closer than this differ by rounding
@@ -81,7 +83,7 @@ class _Search:
         self.found = best.found
         self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
         limits = self.limits.within(GRACE) if best.interrupted else self.limits
-        if likely_policy(best.found, _LARGE) is not None:
+        if likely_policy(best.found, LARGE_POLICY) is not None:
             self._draft(one_policy(best.found), limits)
         policy = self._cheapest(best.found, limits)
         self._keep(synthesize(self.task, policy, limits), limits)
