@@ -177,6 +177,33 @@ def test_a_loop_that_can_be_left_only_with_a_loss_is_not_worth_more_than_its_exi
     assert search_bounds(of, Limits(), step=SMALL).bounds.exact == Fraction(1, 3)
 
 
+def test_a_loop_that_is_hardly_ever_left_does_not_hold_the_search_up() -> None:
+    """Two states that lead to one another, and out of them once in five hundred times, for good or ill."""
+    exits = (("0.001", {1: T}), ("0.001", {2: T}))
+    there = action("there", conjunction([Is(0, F), Is(2, F)]), ("0.998", {0: T}), *exits)
+    back = action("back", conjunction([Is(0, T), Is(2, F)]), ("0.998", {0: F}), *exits)
+    of = task("room won over", {}, Is(1, T), there, back)
+    bounds = search_bounds(of, Limits(), step=SMALL).bounds
+    assert float(bounds.lower) == pytest.approx(0.5, abs=1e-6)
+    assert float(bounds.upper) == pytest.approx(0.5, abs=1e-6)
+
+
+def test_a_target_that_is_out_of_reach_does_not_end_the_search_unless_only_that_is_asked() -> None:
+    """A toss decides at once that no policy reaches more than 1/2; then comes a long way."""
+    alive = Is(1, F)
+    toss = action("a-toss", conjunction([Is(0, F), alive]), ("1/2", {0: T}), ("1/2", {1: T}))
+    steps = []
+    for at in range(2, 30):
+        before = [Is(each, T) for each in (0, *range(2, at))]
+        steps.append(action(f"b{at:02}", conjunction([alive, *before]), ("9/10", {at: T}), ("1/10", {1: T})))
+    of = task("won lost " + " ".join(f"s{at:02}" for at in range(2, 30)), {}, Is(29, T), toss, *steps)
+    told = search_bounds(of, Limits(), Fraction(9, 10), verdict=True, step=SMALL)
+    assert told.bounds.upper < Fraction(9, 10)
+    found = search_bounds(of, Limits(), Fraction(9, 10), step=SMALL)
+    assert float(found.bounds.lower) == pytest.approx(0.5 * 0.9**28, abs=1e-6)
+    assert told.space.expanded < found.space.expanded
+
+
 def test_a_goal_that_nothing_reaches_takes_no_expansion() -> None:
     found = search_bounds(task("a b", {}, Is(0, T), action("b", Is(1, F), ("1", {1: T}))), Limits())
     assert found.bounds.exact == 0

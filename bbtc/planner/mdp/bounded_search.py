@@ -158,8 +158,15 @@ class _Search:
         self.guided = guided
         guided.note(self.guess.tolist(), self.explorer.goal().tolist())
         settled = probed = False
-        while not settled and not self._done(self.solved.bounds) and self.expanded < _MOST_GUIDED:
-            until = max(self.step, 2 * self.expanded)
+        before = -1
+        while (
+            not settled
+            and self.expanded > before
+            and not self._done(self.solved.bounds)
+            and self.expanded < _MOST_GUIDED
+        ):
+            before = self.expanded
+            until = max(self.step, 2 * before)
 
             def more(until: int = until) -> bool:
                 self.limits.check_time("the search for the best probability", self.explorer.count)
@@ -170,6 +177,7 @@ class _Search:
             else:
                 settled = guided.run(more)
             self.solved = self._solve()
+            guided.bound(self.solved.upper.upper.tolist())
 
     def _found(self, states: list[int]) -> Choices:
         """Expand some states, all of them."""

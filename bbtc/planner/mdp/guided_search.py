@@ -24,6 +24,7 @@ _EQUAL = 1e-12  # values closer than this count as equal
 _REST = 1e-11  # values that move by less are at rest
 _SWEEPS = 200  # backups of a set of states in one visit, at most
 _AT_ONCE = 16  # states expanded at a time by :meth:`Guided.probe`
+_MOST_IDLE = 20  # passes that expand nothing, one after the other
 _FAR = 1e4  # what a dead end counts as, in actions
 
 Expand = Callable[[list[int]], Choices]
@@ -83,11 +84,16 @@ class Guided:
             self.settled.append(dead or goal)
 
     def run(self, more: Callable[[], bool]) -> bool:
-        """Search until all is settled (then the result is True), or ``more`` says that it is enough."""
+        """Search until all is settled (then the result is True), ``more`` says that it is enough, or values
+        change for long and nothing is to be expanded."""
+        idle = 0
         while True:
             tips, changed = self._pass()
             if not tips and not changed:
                 return all(self.settled[self._of(state)] for state in self.initial)
+            idle = 0 if tips else idle + 1
+            if idle > _MOST_IDLE:
+                return False
             while tips:
                 if not more():
                     return False
@@ -95,6 +101,11 @@ class Guided:
                 tips = self._ahead(tips)
             if not more():
                 return False
+
+    def bound(self, values: Sequence[float]) -> None:
+        """Upper bounds of the first states, known otherwise."""
+        lower = map(min, self.value, values)
+        self.value[: len(values)] = list(lower)
 
     def probe(self, more: Callable[[], bool]) -> bool:
         """Expand what the heuristic thinks closest to the goal, whatever the policy is, until a state of the
