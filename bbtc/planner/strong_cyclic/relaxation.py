@@ -13,7 +13,7 @@ from heapq import heappop, heappush
 
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import ALWAYS, BitTest, cubes, set_bits
-from bbtc.planner.strong_cyclic.determinised import Determinised
+from bbtc.planner.strong_cyclic.determinised import Determinised, Step
 from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, literals, united, without
 
@@ -28,10 +28,12 @@ _OPERATORS_AT_ONCE = 1024  # between two looks at the limits
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """``steps`` of a relaxed plan, and the actions of it that may start at once."""
+    """``steps`` of a relaxed plan, the actions of it that may start at once, and all of it: actions with the
+    outcomes wanted, those that need least first."""
 
     steps: int
     helpful: tuple[int, ...]
+    plan: tuple[tuple[int, Step], ...]
 
 
 class Relaxation:
@@ -56,8 +58,9 @@ class Relaxation:
         self._action: list[int] = []
         self._needs: list[tuple[int, ...]] = []
         self._adds: list[tuple[int, ...]] = []
+        self._steps: list[Step | None] = []
         known = {3 + 4 * v for v, at in enumerate(self.packing.unknown) if at is not None}
-        made: dict[tuple[tuple[int, ...], tuple[int, ...], int], None] = {}
+        made: dict[tuple[tuple[int, ...], tuple[int, ...], int], Step | None] = {}
         for needs in self._facts_of(self.model.goal, ANY_STATE):
             made[needs, (self.goal,), -1] = None
         for action in self.model.actions:
@@ -71,7 +74,7 @@ class Relaxation:
                     ]:
                         adds = tuple(self._added(sets, known))
                         for needs in self._facts_of(when, need):
-                            made[needs, adds, action.number] = None
+                            made.setdefault((needs, adds, action.number), step)
         self._users: list[list[int]] = [[] for _ in range(self.count)]
         self._counts: list[int] = []
         self._operators: dict[int, list[int]] = {}
@@ -79,13 +82,16 @@ class Relaxation:
         self._wanted = bytearray(self.count)
         self._masks = [0, 0, 0, 0]
         self._choices: dict[tuple[int, ...], int] = {}
-        for needs, adds, number in made:
-            self._operate(needs, adds, number)
+        for (needs, adds, number), outcome in made.items():
+            self._operate(needs, adds, number, outcome)
         self._want(self.goal)
 
-    def _operate(self, needs: tuple[int, ...], adds: tuple[int, ...], action: int) -> None:
+    def _operate(
+        self, needs: tuple[int, ...], adds: tuple[int, ...], action: int, step: Step | None
+    ) -> None:
         """One more operator; what it adds counts where something needs it."""
         operator = len(self._needs)
+        self._steps.append(step)
         self._needs.append(needs)
         self._counts.append(len(needs))
         self._action.append(action)
@@ -164,7 +170,7 @@ class Relaxation:
             self._users.append([])
             self._wanted.append(1)
             for way in ways:
-                self._operate((way,), (known,), -1)
+                self._operate((way,), (known,), -1, None)
         return known
 
     def holding(self, state: int) -> list[int]:
@@ -204,7 +210,7 @@ class Relaxation:
             if spent > cost[fact]:
                 continue
             if fact == goal:
-                return self._relaxed_plan(by, cost)
+                return self._relaxed_plan(by, total)
             for operator in users[fact]:
                 left[operator] -= 1
                 total[operator] += spent
@@ -217,9 +223,8 @@ class Relaxation:
                             heappush(queue, price * size + added)
         return None
 
-    def _relaxed_plan(self, by: list[int], cost: list[int]) -> Estimate:
-        chosen: set[tuple[int, tuple[int, ...]]] = set()
-        helpful: set[int] = set()
+    def _relaxed_plan(self, by: list[int], total: list[int]) -> Estimate:
+        chosen: dict[tuple[int, tuple[int, ...]], int] = {}
         seen = {self.goal}
         stack = [self.goal]
         while stack:
@@ -229,14 +234,15 @@ class Relaxation:
             needs = self._needs[operator]
             action = self._action[operator]
             if action >= 0:
-                chosen.add((action, needs))
-                if all(cost[fact] == 0 for fact in needs):
-                    helpful.add(action)
+                chosen.setdefault((action, needs), operator)
             for fact in needs:
                 if fact not in seen:
                     seen.add(fact)
                     stack.append(fact)
-        return Estimate(len(chosen), tuple(sorted(helpful)))
+        operators = sorted(chosen.values(), key=lambda operator: (total[operator], operator))
+        helpful = {self._action[operator] for operator in operators if not total[operator]}
+        plan = [(self._action[operator], self._steps[operator]) for operator in operators]
+        return Estimate(len(chosen), tuple(sorted(helpful)), tuple([(a, s) for a, s in plan if s is not None]))
 
     # --- dead ends ----------------------------------------------------------------------------------
 
@@ -248,16 +254,25 @@ class Relaxation:
         kept = self.exclusion.shortest(PartialState(self._full, state & self._full))
         # What would be true without them, and makes no difference.
         kept = without(kept, ~state & self._two_valued & ~self._masks[2])
-        for literal in sorted(literals(self.packing, kept), key=lambda each: each.value != 0):
+        free, simple = 0, kept.mask & self._two_valued & ~(kept.value & self.exclusion.members)
+        for bit in set_bits(simple):
+            if reach.add((4 * bit, 4 * bit + 2)):
+                free |= 1 << bit
+        rest, kept = without(kept, simple), without(kept, free)
+        for literal in sorted(literals(self.packing, rest), key=lambda each: each.value != 0):
             kept = self._freed(reach, kept, literal)
         return kept
+
+    def _set_free(self, literals: PartialState, rest: PartialState) -> int:
+        """The variables that may be true once some literals do not hold, which excluded them."""
+        if not literals.value & self.exclusion.members:
+            return 0
+        return self.exclusion.implied(literals) & ~self.exclusion.implied(rest) & ~rest.mask
 
     def _freed(self, reach: _Reach, kept: PartialState, literal: PartialState) -> PartialState:
         """A partial state without a literal of it, if the goal stays out of reach."""
         rest = without(kept, literal.mask)
-        mates = 0
-        if literal.value & self.exclusion.members:
-            mates = self.exclusion.implied(literal) & ~self.exclusion.implied(rest) & ~rest.mask
+        mates = self._set_free(literal, rest)
         facts = self._other_facts(literal.mask)
         if reach.add([*facts, *self._other_facts(mates)]):
             return rest
@@ -294,11 +309,12 @@ class _Reach:
 
     def add(self, facts: Iterable[int]) -> bool:
         """Add facts and what follows; unless the goal would be reached: then nothing changes."""
-        new: list[int] = []
-        for fact in facts:
-            if not self.reached[fact]:
-                self.reached[fact] = 1
-                new.append(fact)
+        reached = self.reached
+        new = [fact for fact in facts if not reached[fact]]
+        if not new:
+            return True
+        for fact in new:
+            reached[fact] = 1
         used = 0
         for fact in new:  # grows while it is read
             if fact == self.goal:
