@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from heapq import heappop, heappush
+from heapq import heapify, heappop, heappush
 
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import ALWAYS, BitTest, cubes, set_bits
@@ -58,11 +58,9 @@ class Relaxation:
         self._action: list[int] = []
         self._needs: list[tuple[int, ...]] = []
         self._adds: list[tuple[int, ...]] = []
-        self._steps: list[Step | None] = []
+        self._steps: list[dict[int, Step]] = []
         known = {3 + 4 * v for v, at in enumerate(self.packing.unknown) if at is not None}
-        made: dict[tuple[tuple[int, ...], tuple[int, ...], int], Step | None] = {}
-        for needs in self._facts_of(self.model.goal, ANY_STATE):
-            made[needs, (self.goal,), -1] = None
+        made: dict[tuple[tuple[int, ...], int], dict[int, Step]] = {}
         for action in self.model.actions:
             if action.number % _OPERATORS_AT_ONCE == 0:
                 self.limits.check_time("planning")
@@ -72,9 +70,9 @@ class Relaxation:
                     for when, sets in [(part.when, part.sets) for part in step.guarded] or [
                         (ALWAYS, step.sets)
                     ]:
-                        adds = tuple(self._added(sets, known))
+                        adds = dict.fromkeys(self._added(sets, known), step)
                         for needs in self._facts_of(when, need):
-                            made.setdefault((needs, adds, action.number), step)
+                            made[needs, action.number] = adds | made.get((needs, action.number), {})
         self._users: list[list[int]] = [[] for _ in range(self.count)]
         self._counts: list[int] = []
         self._operators: dict[int, list[int]] = {}
@@ -82,16 +80,24 @@ class Relaxation:
         self._wanted = bytearray(self.count)
         self._masks = [0, 0, 0, 0]
         self._choices: dict[tuple[int, ...], int] = {}
-        for (needs, adds, number), outcome in made.items():
-            self._operate(needs, adds, number, outcome)
+        self._at: int | None = None
+        self._ready: set[int] = set()
+        self._left: list[int] = []
+        self._cost: list[int] = []
+        for needs in self._facts_of(self.model.goal, ANY_STATE):
+            self._operate(needs, (self.goal,), -1, {})
+        for (needs, number), steps in made.items():
+            self._operate(needs, tuple([fact for fact in steps if fact not in needs]), number, steps)
         self._want(self.goal)
 
     def _operate(
-        self, needs: tuple[int, ...], adds: tuple[int, ...], action: int, step: Step | None
+        self, needs: tuple[int, ...], adds: tuple[int, ...], action: int, steps: dict[int, Step]
     ) -> None:
-        """One more operator; what it adds counts where something needs it."""
+        """One more operator, for all steps of an action with the same needs: which of them adds a fact is
+        told by ``steps``. What it adds counts where something needs it."""
+        self._at = None
         operator = len(self._needs)
-        self._steps.append(step)
+        self._steps.append(steps)
         self._needs.append(needs)
         self._counts.append(len(needs))
         self._action.append(action)
@@ -139,6 +145,7 @@ class Relaxation:
 
     def forbid(self, action: int, partial: PartialState) -> None:
         """The action must not start where something holds: one of its literals must not hold."""
+        self._at = None
         if not partial.mask:
             for operator in self._operators.pop(action, ()):
                 self._counts[operator] += 1  # which nothing counts down
@@ -170,7 +177,7 @@ class Relaxation:
             self._users.append([])
             self._wanted.append(1)
             for way in ways:
-                self._operate((way,), (known,), -1, None)
+                self._operate((way,), (known,), -1, {})
         return known
 
     def holding(self, state: int) -> list[int]:
@@ -191,19 +198,59 @@ class Relaxation:
 
     # --- the heuristic ----------------------------------------------------------------------------
 
+    def _go_to(self, state: int) -> None:
+        """Make a state the one that costs are counted from: ``_cost`` of its facts is 0, ``_left`` are the
+        facts that operators need besides, and ``_ready`` the operators that need none."""
+        if self._at is None:
+            self._cost, self._left = [_NEVER] * self.count, self._counts.copy()
+            self._ready = set()
+            self._gain([*self.holding(state), self._always])
+        elif self._at != state:
+            changed = {self.packing.owner(bit) for bit in set_bits(self._at ^ state)}
+            before = [fact for variable in changed for fact in self._facts_in(self._at, variable)]
+            after = [fact for variable in changed for fact in self._facts_in(state, variable)]
+            for fact in before:
+                self._cost[fact] = _NEVER
+                for operator in self._users[fact]:
+                    if not self._left[operator]:
+                        self._ready.remove(operator)
+                    self._left[operator] += 1
+            self._gain(after)
+        self._at = state
+
+    def _gain(self, facts: Iterable[int]) -> None:
+        for fact in facts:
+            self._cost[fact] = 0
+            for operator in self._users[fact]:
+                self._left[operator] -= 1
+                if not self._left[operator]:
+                    self._ready.add(operator)
+
+    def _facts_in(self, state: int, variable: int) -> tuple[int, ...]:
+        """The facts of one variable in a state."""
+        at = self.packing.unknown[variable]
+        if at is not None and state >> at & 1:
+            return (4 * variable + 1,)
+        value = 4 * variable + (2 if state >> variable & 1 else 0)
+        return (value,) if at is None else (value, 4 * variable + 3)
+
     def estimate(self, state: int) -> Estimate | None:
         """A guess of the steps to the goal; None if it is out of reach, even in the relaxation."""
-        cost = [_NEVER] * self.count
-        by = [-1] * self.count
-        left = self._counts.copy()
-        total = [0] * len(left)
-        queue: list[int] = []
-        size = self.count
-        holding = [*self.holding(state), self._always]
-        for fact in holding:
-            cost[fact] = 0
-            queue.append(fact)
+        self._go_to(state)
         users, adds, actions, goal = self._users, self._adds, self._action, self.goal
+        cost, left = self._cost.copy(), self._left.copy()
+        by = [-1] * self.count
+        total = [0] * len(left)
+        size = self.count
+        queue: list[int] = []
+        for operator in sorted(self._ready):
+            price = int(actions[operator] >= 0)
+            for added in adds[operator]:
+                if price < cost[added]:
+                    cost[added] = price
+                    by[added] = operator
+                    queue.append(price * size + added)
+        heapify(queue)
         while queue:
             entry = heappop(queue)
             spent, fact = divmod(entry, size)
@@ -224,25 +271,24 @@ class Relaxation:
         return None
 
     def _relaxed_plan(self, by: list[int], total: list[int]) -> Estimate:
-        chosen: dict[tuple[int, tuple[int, ...]], int] = {}
+        chosen: dict[int, dict[Step, None]] = {}
         seen = {self.goal}
         stack = [self.goal]
         while stack:
-            operator = by[stack.pop()]
+            reached = stack.pop()
+            operator = by[reached]
             if operator < 0:
                 continue
-            needs = self._needs[operator]
-            action = self._action[operator]
-            if action >= 0:
-                chosen.setdefault((action, needs), operator)
-            for fact in needs:
+            if self._action[operator] >= 0:
+                chosen.setdefault(operator, {})[self._steps[operator][reached]] = None
+            for fact in self._needs[operator]:
                 if fact not in seen:
                     seen.add(fact)
                     stack.append(fact)
-        operators = sorted(chosen.values(), key=lambda operator: (total[operator], operator))
+        operators = sorted(chosen, key=lambda operator: (total[operator], operator))
         helpful = {self._action[operator] for operator in operators if not total[operator]}
-        plan = [(self._action[operator], self._steps[operator]) for operator in operators]
-        return Estimate(len(chosen), tuple(sorted(helpful)), tuple([(a, s) for a, s in plan if s is not None]))
+        plan = [(self._action[operator], step) for operator in operators for step in chosen[operator]]
+        return Estimate(len(operators), tuple(sorted(helpful)), tuple(plan))
 
     # --- dead ends ----------------------------------------------------------------------------------
 

@@ -123,7 +123,7 @@ class Searcher:
                     if arrived(after):
                         return _traced(parent, after)
                     frontier.push(after, (found.steps, depth[after]), number in helpful, novel)
-            for taken, after in self._followed(state, found, arrived):
+            for taken, after in self._followed(state, found, arrived) if frontier.progress else ():
                 ahead = after
                 if after not in parent:
                     parent[after], depth[after] = taken, depth[taken.state] + 1
@@ -177,6 +177,8 @@ class _Frontier:
         self._count = 0
         self._best: int | None = None
         self._progress = 0
+        self.progress = False
+        """Is the state expanded last closer to the goal than all before?"""
         self._seen: dict[int, int] = {}
 
     def __bool__(self) -> bool:
@@ -195,7 +197,8 @@ class _Frontier:
     def expand(self, state: int, steps: int) -> bool:
         """A state is expanded; is something true in it that was not in others as far from the goal?"""
         self.expanded[state] = None
-        if self._best is None or steps < self._best:
+        self.progress = self._best is None or steps < self._best
+        if self.progress:
             if self._best is not None:
                 self._priority[_HELPFUL] -= _BOOST
             self._best, self._progress = steps, len(self.expanded)
