@@ -66,7 +66,7 @@ class Relaxation:
                 self.limits.check_time("planning")
             disjuncts = (ANY_STATE,) if action.needs is None else action.needs
             for need in disjuncts:
-                for step in action.steps:
+                for step in sorted(action.steps, key=_changes):
                     for when, sets in [(part.when, part.sets) for part in step.guarded] or [
                         (ALWAYS, step.sets)
                     ]:
@@ -341,6 +341,11 @@ class Relaxation:
             values = (0, 2) if self.packing.unknown[variable] is None else (0, 1, 2, 3)
             found.extend(4 * variable + value for value in values)
         return found
+
+
+def _changes(step: Step) -> int:
+    """How much a step sets: of those that add a fact, the one with the fewest side effects is wanted."""
+    return sum(len(part.sets) for part in step.guarded) or len(step.sets)
 
 
 class _Reach:
