@@ -25,6 +25,9 @@ _FEW_STATES = 200
 """A tree with so many states is simulated in all of them; one with more, in as many as differ in what
 matters."""
 
+_MOST_SHORT = 6
+"""How many short trees are tried; each decides as the policy in the states that those before it met."""
+
 _FOR_SHORT = 0.6
 """Of the time left, what may be spent on the short tree while there is none."""
 
@@ -60,24 +63,29 @@ def plan_strong_cyclic(
 
 
 def _keep(best: BestTree, solver: Solver, solved: Solved, limits: Limits) -> None:
-    """A tree of the policy that is shown to succeed always: the short one, else the plain one."""
+    """A tree of the policy that is shown to succeed always: a short one, else the plain one."""
     rules = Rules(solver.model, solver.exclusion, solved, limits)
     try:
-        if _keep_if_sure(best, solver, rules.short(), limits.part(_FOR_SHORT)):
-            return
+        for _ in range(_MOST_SHORT):
+            chain = _keep_if_sure(best, solver, rules.short(), limits.part(_FOR_SHORT))
+            if chain is None or not rules.meet(solver.model.packing.pack(each.values) for each in chain.states):
+                break
     except LimitReached:
         limits.check_time("the search for a small tree")
-    _keep_if_sure(best, solver, rules.plain(), limits)
+    if best.success < 1:
+        _keep_if_sure(best, solver, rules.plain(), limits)
 
 
-def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits: Limits) -> bool:
+def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits: Limits) -> Chain | None:
+    """Keep a tree that succeeds always; of another one, return the chain."""
     root = tree_of(solver.task, solver.model, rules)
     limits.check_nodes(size(root))
     chain = chain_of(solver, root, limits)
     success = success_of(chain)
-    if success == 1:
-        best.take(root, chain, success)
-    return success == 1
+    if success < 1:
+        return chain
+    best.take(root, chain, success)
+    return None
 
 
 def chain_of(solver: Solver, root: Node, limits: Limits) -> Chain:

@@ -80,6 +80,9 @@ def _values(unknown: tuple[int | None, ...], state: int) -> Values:
     )
 
 
+_MOST_FALSE = 2  # members of a group that are noted to be false one by one
+
+
 class _Known:
     """What was read of a state so far, and what follows from it."""
 
@@ -93,6 +96,13 @@ class _Known:
         if partial.mask & ~self.closed.mask:
             self.read = united(self.read, partial)
             self.closed = self._exclusion.closed(self.read)
+
+    def note_first_of_group(self, literal: PartialState, state: int) -> None:
+        """Note a literal; where it is one more of a group that is false, what is true of the group instead."""
+        mates = self._exclusion.mates.get(literal.mask.bit_length() - 1, 0)
+        if not literal.value and (mates & self.read.mask).bit_count() >= _MOST_FALSE:
+            literal = self._exclusion.strongest(literal, state)
+        self.note(literal)
 
 
 _Tick: TypeAlias = Callable[[int, _Known], int]
@@ -226,7 +236,7 @@ class _Ticks:
                 known.note(cube)
                 return int(NodeStatus.SUCCESS)
             if not wrong & known.closed.mask:
-                known.note(reasons.differs(cube, state))
+                known.note_first_of_group(reasons.differs(cube, state), state)
             return int(NodeStatus.FAILURE)
 
         return read

@@ -8,7 +8,7 @@ read as false then.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from bbtc.ground.condition import (
@@ -74,31 +74,47 @@ class Rules:
 
     def __init__(self, model: Determinised, exclusion: Exclusion, solved: Solved, limits: Limits) -> None:
         self.model, self.exclusion, self.solved, self.limits = model, exclusion, solved, limits
+        self._plain = self._merged(self.plain())
+        self._actions: dict[int, int] = {}
+        """The action of each state met that is not in the goal, -1 where no rule applies."""
+        self.meet(solved.visited)
+
+    def meet(self, states: Iterable[int]) -> bool:
+        """From now on, short rules decide as plain ones in these states, too; False if they did so before."""
+        new = [s for s in states if s not in self._actions and not satisfied(self.model.goal, s)]
+        for state in new:
+            able = (rule.action for rule in self._plain if self._applies(rule, state))
+            self._actions[state] = next(able, -1)
+        return bool(new)
 
     def plain(self) -> list[Rule]:
         """A rule for each pair, with all that the rest of the plan needs."""
         return [Rule((self._guard(pair.partial, pair.action),), pair.action) for pair in self.solved.pairs]
 
     def short(self) -> list[Rule]:
-        """Rules that decide alike in all states that were visited, with less in their guards, fewer of
-        them."""
-        rules = self._merged(self.plain())
-        undecided = [state for state in self.solved.visited if not satisfied(self.model.goal, state)]
+        """Rules that decide alike in all states met, with less in their guards, fewer of them."""
+        actions = self._actions
+        undecided = [state for state, action in actions.items() if action >= 0]
         found: list[Rule] = []
-        actions = self._decisions(rules, undecided)
-        for number, rule in enumerate(rules):
+        for rule in self._plain:
             self.limits.check_time("the search for a small tree")
-            guards = list(rule.guards)
             test = self.model.actions[rule.action].test
-            others = [
-                state for state in undecided if actions[state] != rule.action and satisfied(test, state)
-            ]
-            for at, guard in enumerate(guards):
-                guards[at] = self._shorter(guard, others)
+            able = [state for state in undecided if satisfied(test, state)]
+            others = [state for state in able if actions[state] != rule.action]
+            waiting = [state for state in able if actions[state] == rule.action]
+            guards: list[Guard] = []
+            for guard in rule.guards:
+                if not any(guard.holds(state) for state in waiting):
+                    continue  # those before it, with less in them, decide all that it does
+                guard = self._shorter(guard, others)
+                guards.append(guard)
+                waiting = [state for state in waiting if not guard.holds(state)]
+            if not guards:
+                continue
             short = Rule(tuple(guards), rule.action)
             found.append(short)
             undecided = [state for state in undecided if not self._applies(short, state)]
-            if not undecided and number < len(rules):
+            if not undecided:
                 break  # the rest decides nothing that is met
         return self._merged(found)
 
@@ -135,12 +151,6 @@ class Rules:
             if self.model.packing.unknown[variable] is None or not partial.mask >> variable & 1:
                 return PartialState(partial.mask, partial.mask & ~partial.value)
         return None
-
-    def _decisions(self, rules: Sequence[Rule], states: Sequence[int]) -> dict[int, int]:
-        """The action of each state, -1 where no rule applies."""
-        return {
-            state: next((rule.action for rule in rules if self._applies(rule, state)), -1) for state in states
-        }
 
     def _applies(self, rule: Rule, state: int) -> bool:
         return satisfied(self.model.actions[rule.action].test, state) and any(
