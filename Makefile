@@ -12,6 +12,10 @@ MUTANTS ?= 150
 SEED ?= 0
 OLDEST_PY_TREES := build/py_trees-2.2/py_trees
 
+# Programs and tests start Python hundreds of times: each would compile all of bbtc anew where the environment asks
+# for no bytecode to be kept.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-long long-forms explore mutants lint docs format golden pictures clean python-version
 

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from bbtc.belief.stepper import Stepper
     from bbtc.builder.runner import BuildReport
     from bbtc.comparison import Comparison
+    from bbtc.disturbance.perturbed import PerturbedRuns
+    from bbtc.disturbance.recovery import Recovery
     from bbtc.ground.task import Task
     from bbtc.model.domain import Model
     from bbtc.planner.bounds import TaskValue
@@ -216,6 +218,52 @@ def simulate(tree: Source | Tree | Plan, *, limits: Limits | None = None) -> Fig
     return pipeline.simulate_tree(_tree(tree, limits), limits or Limits())[0]
 
 
+def perturb(
+    tree: Source | Tree | Plan,
+    rate: Probability,
+    *,
+    task: Task | None = None,
+    runs: int = 10_000,
+    seed: int = 0,
+    max_ticks: int = 1000,
+    limits: Limits | None = None,
+) -> PerturbedRuns:
+    """What comes of so many runs of a tree where before each tick, with probability ``rate``, a fact of the
+    world changes by itself; the same seed gives the same. A tree from a file knows the actions that it uses:
+    those of a ``task`` count, too, if one is given.
+
+    Raises as :func:`simulate` does, and ``ValueError`` for a rate that is no probability, and for runs or
+    ticks below 1.
+    """
+    from bbtc.artefacts.numbers import parse_probability
+    from bbtc.disturbance.perturbed import perturbed_runs
+
+    chance, limits = parse_probability(str(rate)), limits or Limits()
+    known = _on_task(tree, task, limits)
+    return perturbed_runs(known.task, known.root, chance, limits, runs=runs, seed=seed, most_ticks=max_ticks)
+
+
+def recovery(
+    tree: Source | Tree | Plan,
+    *,
+    task: Task | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    limits: Limits | None = None,
+) -> Recovery:
+    """What a new tree attains from every state that actions lead to, beside the best that is possible from
+    there; of more than 10,000 states, or where ``samples`` are asked for, from a uniform sample of them. A
+    tree from a file knows the actions that it uses: give the ``task`` for all.
+
+    Raises as :func:`simulate` does, and ``ValueError`` for samples below 1.
+    """
+    from bbtc.disturbance.recovery import recovery as recovery_of
+
+    limits = limits or Limits()
+    known = _on_task(tree, task, limits)
+    return recovery_of(known.task, known.root, limits, samples=samples, seed=seed)
+
+
 def scenarios(tree: Source | Tree | Plan, count: int, *, limits: Limits | None = None) -> list[Scenario]:
     """The most probable runs of a tree, at most ``count``. Raises as :func:`simulate` does."""
     from itertools import islice
@@ -388,6 +436,18 @@ def _tree(value: Source | Task | Tree | Plan, limits: Limits | None) -> Tree:
     if isinstance(value, str | os.PathLike | SourceFile):
         return load_tree(value, limits=limits)
     raise TypeError(f"no tree: {type(value).__name__}")
+
+
+def _on_task(value: Source | Tree | Plan, task: Task | None, limits: Limits) -> Tree:
+    """A tree on a task of which it uses some of the actions."""
+    from bbtc.artefacts import dumps as to_text
+    from bbtc.artefacts import load_tree as tree_from_text
+    from bbtc.artefacts import tree_to_json
+
+    tree = _tree(value, limits)
+    if task is None or task is tree.task:
+        return tree
+    return tree_from_text(SourceFile("the tree", to_text(tree_to_json(tree))), task)
 
 
 def _exact(value: Probability | None) -> Fraction | None:

@@ -48,6 +48,10 @@ class Code:
         """The name of its page among those that :mod:`bbtc.pages` reads."""
         return f"{self.code}.md"
 
+    def help_uri(self, site: str) -> str:
+        """The address of its page on the documentation site (:func:`bbtc.pages.site`)."""
+        return f"{site.rstrip('/')}/errors/{self.code}.html"
+
 
 _CODES = (
     # 00xx: files and limits

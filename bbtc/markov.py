@@ -1,4 +1,5 @@
-"""Finite Markov chains: strongly connected components of their graph, and linear systems over them, exactly.
+"""Finite Markov chains: their graph (what can be reached, strongly connected components), and linear systems
+over them, exactly.
 
 Components are found by depth-first search (Tarjan 1972). A system x = P x + c is solved one component at a
 time; a component of one state is a plain sum, so acyclic chains cost one pass, and loops are solved by
@@ -9,14 +10,35 @@ Gaussian elimination over rationals, the state with the fewest links first (mini
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 Row: TypeAlias = dict[int, Fraction]
 """Probabilities by successor; what is missing to 1 leaves the chain."""
 
+_N = TypeVar("_N", bound=Hashable)
 _ZERO = Fraction(0)
+
+
+def reachable(start: Iterable[_N], successors: Callable[[_N], Iterable[_N]]) -> set[_N]:
+    """All that can be reached from ``start``, itself included."""
+    found = set(start)
+    waiting = list(found)
+    while waiting:
+        for node in successors(waiting.pop()):
+            if node not in found:
+                found.add(node)
+                waiting.append(node)
+    return found
+
+
+def distribution(parts: Iterable[tuple[_N, Fraction]]) -> dict[_N, Fraction]:
+    """A distribution from its parts, those of equal outcomes added up, in order of appearance."""
+    found: dict[_N, Fraction] = {}
+    for outcome, probability in parts:
+        found[outcome] = found[outcome] + probability if outcome in found else probability
+    return found
 
 
 def components(successors: Sequence[Sequence[int]]) -> list[list[int]]:

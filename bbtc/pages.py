@@ -15,3 +15,16 @@ def page(code: str) -> str:
     if packaged.is_file():
         return packaged.read_text("utf-8")
     return (Path(__file__).parents[1] / "docs" / "errors" / CODES[code].page).read_text("utf-8")
+
+
+def site() -> str | None:
+    """Where the pages are published: the URL "Documentation" of the installed package's metadata
+    (``[project.urls]`` of ``pyproject.toml``). None if it names none."""
+    from importlib.metadata import PackageNotFoundError, metadata
+
+    try:
+        urls = metadata("bbtc").get_all("Project-URL") or []
+    except PackageNotFoundError:
+        return None
+    named = dict(each.split(", ", 1) for each in urls)
+    return named.get("Documentation")

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Report, Severity
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.model.domain import Model
 from bbtc.rounding import figure_text
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
-from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.tree.nodes import PlanStatus, Tree
 
 if TYPE_CHECKING:
@@ -25,8 +23,10 @@ if TYPE_CHECKING:
     from bbtc.belief.chain import Chain
     from bbtc.belief.simulate import Figures
     from bbtc.comparison import Comparison
+    from bbtc.model.domain import Model
     from bbtc.planner.options import Options
     from bbtc.planner.result import Plan, Progress
+    from bbtc.syntax.ast import Definition, Document
     from bbtc.verifier.verdict import Engine, Verdict
 
 
@@ -97,6 +97,8 @@ def _narrow(found: dict[str, list[Definition]], name: str, names: str, report: R
         report.error("BBT0006", f"no problem `{name[:100]}` in {names}", hint=hint)
         return False
     if len(found["domain"]) > 1:
+        from bbtc.syntax.ast import DomainReference
+
         wanted = {s.name.key for s in found["problem"][0].sections if isinstance(s, DomainReference)}
         found["domain"] = [d for d in found["domain"] if d.name.key in wanted] or found["domain"]
     return True
@@ -203,6 +205,8 @@ def _doubts(model: Model, limits: Limits) -> list[Diagnostic]:
 
 
 def _domain_of(problem: Definition, domains: dict[str, Definition]) -> Definition | None:
+    from bbtc.syntax.ast import DomainReference
+
     wanted = next((s.name.key for s in problem.sections if isinstance(s, DomainReference)), None)
     if wanted in domains:
         return domains[wanted]

@@ -10,9 +10,9 @@ _UNSEEN = re.compile("[\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
 def printable(text: str) -> str:
     """The text on one line, with a replacement character for whatever does not print (among it
     all that XML 1.0 cannot hold)."""
-    return "".join(
-        c if c.isprintable() and c not in "\ufffe\uffff" else "\N{REPLACEMENT CHARACTER}" for c in text
-    )
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def printable_line(text: str) -> str:

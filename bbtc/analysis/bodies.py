@@ -9,7 +9,7 @@ from typing_extensions import assert_never
 from bbtc.analysis.formulas import effect, formula, inner_scope
 from bbtc.analysis.names import Names, Scope
 from bbtc.diagnostics import Related, Report
-from bbtc.markov import components
+from bbtc.markov import components, reachable
 from bbtc.model import domain as md
 from bbtc.model import formula as mf
 from bbtc.syntax import ast
@@ -109,20 +109,14 @@ def _circles(called: Mapping[str, list[md.BodyCall]]) -> dict[str, int]:
 def _acting(templates: Mapping[str, md.Template]) -> set[str]:
     """Names of the templates that contain an action, through others as well."""
     callers: dict[str, list[str]] = {}
-    todo: list[str] = []
+    themselves: list[str] = []
     for name, each in templates.items():
         for call in md.calls(each.body):
             if call.kind == "action":
-                todo.append(name)
+                themselves.append(name)
             else:
                 callers.setdefault(call.name, []).append(name)
-    acting: set[str] = set()
-    while todo:
-        name = todo.pop()
-        if name not in acting:
-            acting.add(name)
-            todo.extend(callers.get(name, ()))
-    return acting
+    return reachable(themselves, lambda name: callers.get(name, ()))
 
 
 def _acts(body: md.Body, acting: set[str]) -> bool:
@@ -130,25 +124,16 @@ def _acts(body: md.Body, acting: set[str]) -> bool:
 
 
 def _check_skippers(report: Report, body: md.Body, acting: set[str]) -> None:
-    match body:
-        case md.BodyControl(kind, children):
-            if kind == "skipper":
-                for position, child in enumerate(children):
-                    # A foreach with actions becomes several children, so it may not be the last either.
-                    several = isinstance(child, md.BodyForeach)
-                    if (several or position < len(children) - 1) and _acts(child, acting):
-                        report.error(
-                            "BBT0216",
-                            "in a skipper only the last child may contain actions",
-                            child.span,
-                            "put the attempts into one last child: "
-                            "(skipper c (sequence (fallback attempt…) c))",
-                        )
-            for child in children:
-                _check_skippers(report, child, acting)
-        case md.BodyForeach(_, child):
-            _check_skippers(report, child, acting)
-        case md.BodyCall() | md.BodyCondition():
-            return
-        case _:
-            assert_never(body)
+    for part in md.walk(body):
+        if not isinstance(part, md.BodyControl) or part.kind != "skipper":
+            continue
+        for position, child in enumerate(part.children):
+            # A foreach with actions becomes several children, so it may not be the last either.
+            several = isinstance(child, md.BodyForeach)
+            if (several or position < len(part.children) - 1) and _acts(child, acting):
+                report.error(
+                    "BBT0216",
+                    "in a skipper only the last child may contain actions",
+                    child.span,
+                    "put the attempts into one last child: (skipper c (sequence (fallback attempt…) c))",
+                )

@@ -7,14 +7,14 @@ warning only where it holds for every one of several problems.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from typing_extensions import assert_never
 
 from bbtc.analysis import facts
-from bbtc.analysis.facts import Known, Reading
+from bbtc.analysis.facts import Known
 from bbtc.analysis.requirements import missing, unneeded
 from bbtc.diagnostics import Diagnostic, Related, Severity
 from bbtc.kleene import Truth
@@ -143,7 +143,7 @@ def _set_to(model: md.Model, *, unknown: bool) -> set[str]:
     }
 
 
-def _untold(known: Known, lost: Collection[str]) -> Iterator[Reading]:
+def _untold(known: Known, lost: Collection[str]) -> Iterator[mf.Reading]:
     """The first reading of the value of each of the ``lost`` predicates, those that are unknown at some time,
     that nothing ever tells."""
     model = known.model
@@ -161,16 +161,16 @@ def _untold(known: Known, lost: Collection[str]) -> Iterator[Reading]:
             yield reading
 
 
-def _lost_later(known: Known) -> Iterator[Reading]:
+def _lost_later(known: Known) -> Iterator[mf.Reading]:
     return _untold(known, _set_to(known.model, unknown=True))
 
 
-def _lost_at_first(known: Known) -> Iterator[Reading]:
+def _lost_at_first(known: Known) -> Iterator[mf.Reading]:
     unknown = {name for name, value in known.reached.values if value is Truth.UNKNOWN}
     return _untold(known, unknown - _set_to(known.model, unknown=True))
 
 
-def _never_known(known: Known, readings: Iterable[Reading]) -> Iterator[Diagnostic]:
+def _never_known(known: Known, readings: Iterable[mf.Reading]) -> Iterator[Diagnostic]:
     for reading in readings:
         name = reading.atom.predicate
         message = f"no action makes `{name}` known"
@@ -178,7 +178,7 @@ def _never_known(known: Known, readings: Iterable[Reading]) -> Iterator[Diagnost
         yield _about_reading("BBT0304", message, reading, hint, known)
 
 
-def _about_reading(code: str, message: str, reading: Reading, hint: str, known: Known) -> Diagnostic:
+def _about_reading(code: str, message: str, reading: mf.Reading, hint: str, known: Known) -> Diagnostic:
     name = reading.atom.predicate
     related = (Related(f"`{name}` is declared here", known.model.predicates[name].span),)
     about = (name, reading.value.word if reading.value else "known")
@@ -189,7 +189,7 @@ def _lost_knowledge(known: Known) -> Iterator[Diagnostic]:
     return _never_known(known, _lost_later(known))
 
 
-def _never_given(known: Known) -> Iterator[tuple[Reading, Truth]]:
+def _never_given(known: Known) -> Iterator[tuple[mf.Reading, Truth]]:
     """The first reading of each value that nothing gives, but for those of which is told that nothing makes
     them known."""
     never_known = {each.atom.predicate for each in (*_lost_at_first(known), *_lost_later(known))}
@@ -288,17 +288,7 @@ def _duplicates(known: Known) -> Iterator[Diagnostic]:
     seen: dict[tuple[object, ...], md.Schema] = {}
     for schema in known.model.schemas.values():
         renamed = {parameter.name: f"?{number}" for number, parameter in enumerate(schema.parameters)}
-        observe = schema.observe
-        if isinstance(observe, me.Choice):
-            observed: object = me.substitute(observe, dict(renamed))
-        else:
-            observed = None if observe is None else mf.substitute(observe, dict(renamed))
-        key = (
-            tuple(parameter.types for parameter in schema.parameters),
-            mf.substitute(schema.precondition, dict(renamed)),
-            me.substitute(schema.effect, dict(renamed)),
-            observed,
-        )
+        key = (tuple(parameter.types for parameter in schema.parameters), *_renamed(schema, renamed))
         before = seen.setdefault(key, schema)
         if before is not schema:
             yield Diagnostic(
@@ -336,44 +326,34 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
 
 def _probabilities(known: Known) -> Iterator[Diagnostic]:
     for schema in known.model.schemas.values():
-        yield from _probabilities_in(schema.effect)
+        for part in me.walk(schema.effect):
+            if isinstance(part, me.Choice):
+                yield from _doubtful(part)
 
 
-def _probabilities_in(effect: me.Effect) -> Iterator[Diagnostic]:
-    match effect:
-        case me.Together(parts):
-            for part in parts:
-                yield from _probabilities_in(part)
-        case me.When(_, inner) | me.ForEach(_, inner):
-            yield from _probabilities_in(inner)
-        case me.Choice(branches, _, span):
-            seen: dict[me.Effect, me.Branch] = {}
-            for branch in branches:
-                rest = branch.span == span and branch.effect == me.NOTHING
-                before = branch if rest else seen.setdefault(branch.effect, branch)
-                if before is not branch and before.probability != 0:
-                    yield Diagnostic(
-                        "BBT0308",
-                        "two outcomes of one choice are the same",
-                        branch.span,
-                        "write it once, with the sum of the probabilities",
-                        related=(Related("the other one", before.span),),
-                    )
-                if branch.probability == 0:
-                    yield Diagnostic("BBT0308", "this outcome has probability 0", branch.span)
-                elif rest and branch.probability <= _SHORTFALL:
-                    total = float(1 - branch.probability)
-                    yield Diagnostic(
-                        "BBT0308",
-                        f"the probabilities sum to {total:.9g}, just short of 1",
-                        span,
-                        "what is missing to 1 means no change",
-                    )
-                yield from _probabilities_in(branch.effect)
-        case me.Set() | me.Add():
-            return
-        case _:
-            assert_never(effect)
+def _doubtful(choice: me.Choice) -> Iterator[Diagnostic]:
+    seen: dict[me.Effect, me.Branch] = {}
+    for branch in choice.branches:
+        rest = branch.span == choice.span and branch.effect == me.NOTHING
+        before = branch if rest else seen.setdefault(branch.effect, branch)
+        if before is not branch and before.probability != 0:
+            yield Diagnostic(
+                "BBT0308",
+                "two outcomes of one choice are the same",
+                branch.span,
+                "write it once, with the sum of the probabilities",
+                related=(Related("the other one", before.span),),
+            )
+        if branch.probability == 0:
+            yield Diagnostic("BBT0308", "this outcome has probability 0", branch.span)
+        elif rest and branch.probability <= _SHORTFALL:
+            total = float(1 - branch.probability)
+            yield Diagnostic(
+                "BBT0308",
+                f"the probabilities sum to {total:.9g}, just short of 1",
+                choice.span,
+                "what is missing to 1 means no change",
+            )
 
 
 def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
@@ -391,17 +371,19 @@ def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
 
 def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
     """Whether renaming the parameter changes the action."""
-    binding: dict[str, str] = {parameter.name: other.name}
-    observe = schema.observe
-    if isinstance(observe, me.Choice):
-        changed: object = me.substitute(observe, binding)
-    else:
-        changed = None if observe is None else mf.substitute(observe, binding)
-    return (
-        mf.substitute(schema.precondition, binding) != schema.precondition
-        or me.substitute(schema.effect, binding) != schema.effect
-        or changed != observe
-    )
+    renamed = _renamed(schema, {parameter.name: other.name})
+    return renamed != (schema.precondition, schema.effect, schema.observe)
+
+
+def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, object, object]:
+    """Precondition, effect and observation with other parameters."""
+    free, observed = dict(binding), schema.observe
+    told: object = None
+    if isinstance(observed, me.Choice):
+        told = me.substitute(observed, free)
+    elif observed is not None:
+        told = mf.substitute(observed, free)
+    return mf.substitute(schema.precondition, free), me.substitute(schema.effect, free), told
 
 
 def _unused_templates(known: Known) -> Iterator[Diagnostic]:

@@ -5,79 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import islice
+from itertools import chain, islice
 
 from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
+from bbtc.markov import reachable
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
-from bbtc.source import Span
 
 Value = tuple[str, Truth]
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """An atom in a condition. ``value`` is what makes the condition true; None for ``known``."""
-
-    atom: mf.Atom
-    value: Truth | None
-    span: Span | None
-
-
-def readings(formula: mf.Formula, negative: bool = False) -> Iterator[Reading]:
-    """Every atom of a condition, with the value that helps to make it true."""
-    match formula:
-        case mf.Atom(_, _, span):
-            yield Reading(formula, Truth.FALSE if negative else Truth.TRUE, span)
-        case mf.Test(kind, atom, span):
-            unknown = (kind == "unknown") is not negative
-            yield Reading(atom, Truth.UNKNOWN if unknown else None, span)
-        case mf.Equal():
-            return
-        case mf.Not(part):
-            yield from readings(part, not negative)
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                yield from readings(part, negative)
-        case mf.Quantified(_, _, part):
-            yield from readings(part, negative)
-        case _:
-            assert_never(formula)
-
-
 def plain(formula: mf.Formula) -> Iterator[str]:
     """Predicates whose unknown value makes the formula unknown: all but those in tests."""
-    match formula:
-        case mf.Atom(predicate):
-            yield predicate
-        case mf.Test() | mf.Equal():
-            return
-        case mf.Not(part) | mf.Quantified(_, _, part):
-            yield from plain(part)
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                yield from plain(part)
-        case _:
-            assert_never(formula)
-
-
-def body_conditions(body: md.Body) -> Iterator[mf.Formula]:
-    """The conditions in a template body."""
-    match body:
-        case md.BodyCondition(condition):
-            yield condition
-        case md.BodyControl(_, children):
-            for child in children:
-                yield from body_conditions(child)
-        case md.BodyForeach(_, child):
-            yield from body_conditions(child)
-        case md.BodyCall():
-            return
-        case _:
-            assert_never(body)
+    return (each.atom.predicate for each in mf.readings(formula) if each.value in (Truth.TRUE, Truth.FALSE))
 
 
 def schema_conditions(schema: md.Schema) -> Iterator[mf.Formula]:
@@ -95,7 +38,7 @@ def template_conditions(template: md.Template) -> Iterator[mf.Formula]:
     yield template.precondition
     if template.effect is not None:
         yield from me.conditions(template.effect)
-    yield from body_conditions(template.body)
+    yield from md.conditions(template.body)
 
 
 def all_conditions(model: md.Model) -> Iterator[mf.Formula]:
@@ -164,9 +107,9 @@ class Known:
         return tuple(all_conditions(self.model))
 
     @cached_property
-    def readings(self) -> tuple[Reading, ...]:
+    def readings(self) -> tuple[mf.Reading, ...]:
         """Every atom in them."""
-        return tuple(reading for formula in self.conditions for reading in readings(formula))
+        return tuple(reading for formula in self.conditions for reading in mf.readings(formula))
 
     @cached_property
     def reached(self) -> Reached:
@@ -285,42 +228,33 @@ def _apply(effect: me.Effect, result: Reached) -> None:
 
 
 def relevant(model: md.Model) -> set[str]:
-    """The actions that can matter to the goal, to a reward metric or to a template, as predicates tell.
-    Grounding knows atoms, and finds more (:mod:`bbtc.ground.relevance`, :mod:`bbtc.ground.prune`)."""
-    predicates: set[str] = set()
-    actions: set[str] = set()
-    todo: list[str] = []
+    """The actions that can matter to the goal, a reward metric or a template, as predicates tell: checks
+    look at models that may be too large to ground. Grounding knows atoms, and finds more
+    (:mod:`bbtc.ground.relevance`, :mod:`bbtc.ground.prune`)."""
+    setters, rules = _setters(model)
 
-    def read(formulas: Iterable[mf.Formula]) -> None:
-        fresh = _read_in(formulas) - predicates
-        predicates.update(fresh)
-        todo.extend(fresh)
+    def leads(node: tuple[bool, str]) -> Iterator[tuple[bool, str]]:
+        is_action, name = node
+        if is_action:
+            return read(schema_conditions(model.schemas[name]) if name in model.schemas else ())
+        return chain(
+            read(rule.condition for rule in rules.get(name, ())),
+            ((True, action) for action in setters.get(name, ())),
+        )
 
-    def act(name: str) -> None:
-        if name not in actions:
-            actions.add(name)
-            if name in model.schemas:
-                read(schema_conditions(model.schemas[name]))
+    def read(formulas: Iterable[mf.Formula]) -> Iterator[tuple[bool, str]]:
+        return ((False, predicate) for predicate in _read_in(formulas))
 
-    if model.goal is not None:
-        read([model.goal])
+    start = [] if model.goal is None else [*read([model.goal])]
     for template in model.templates.values():
-        read(template_conditions(template))
-        for call in md.calls(template.body):
-            if call.kind == "action":
-                act(call.name)
+        start += read(template_conditions(template))
+        start += [(True, call.name) for call in md.calls(template.body) if call.kind == "action"]
     for sensor in model.sensors:
-        read([sensor.condition, sensor.sensed])
+        start += read([sensor.condition, sensor.sensed])
     for name, schema in model.schemas.items():
         if schema.observe is not None or (model.metric == "reward" and me.earns(schema.effect)):
-            act(name)
-    setters, rules = _setters(model)
-    while todo:
-        predicate = todo.pop()
-        read([rule.condition for rule in rules.get(predicate, ())])
-        for name in setters.get(predicate, ()):
-            act(name)
-    return actions
+            start.append((True, name))
+    return {name for is_action, name in reachable(start, leads) if is_action}
 
 
 def _setters(model: md.Model) -> tuple[dict[str, list[str]], dict[str, list[md.Rule]]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -396,7 +395,9 @@ class Names:
 
 def nearest(key: str, known: Iterable[str]) -> str | None:
     """The known name closest in spelling, if one is close."""
-    matches = difflib.get_close_matches(key[:100], likely(key, known), 1, 0.7)
+    from difflib import get_close_matches
+
+    matches = get_close_matches(key[:100], likely(key, known), 1, 0.7)
     return matches[0] if matches else None
 
 

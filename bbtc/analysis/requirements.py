@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -90,7 +89,9 @@ def missing(model: md.Model) -> Iterator[Diagnostic]:
         return
     for key, listed in model.requirements.items():
         if key not in _KNOWN:
-            near = difflib.get_close_matches(key, _KNOWN, 1, 0.75)
+            from difflib import get_close_matches
+
+            near = get_close_matches(key, _KNOWN, 1, 0.75)
             hint = f"did you mean `{near[0]}`?" if near else None
             severity = Severity.WARNING if near else Severity.NOTE
             yield Diagnostic(_CODE, f"`{key}` is no requirement that bbtc knows", listed, hint, severity)
@@ -180,25 +181,21 @@ def _in_formula(formula: mf.Formula) -> Iterator[_Use]:
 
 
 def _in_effect(effect: me.Effect) -> Iterator[_Use]:
-    match effect:
-        case me.Set(_, _, value, span):
-            if value is Truth.UNKNOWN:
-                yield ":unknown", span
-        case me.Add(to, _, _, span):
-            yield ":rewards" if to == "reward" else ":action-costs", span
-        case me.Together(parts):
-            for part in parts:
-                yield from _in_effect(part)
-        case me.When(condition, inner, span):
-            yield ":conditional-effects", span
-            yield from _in_formula(condition)
-            yield from _in_effect(inner)
-        case me.ForEach(_, inner, span):
-            yield ":universal-effects", span
-            yield from _in_effect(inner)
-        case me.Choice(branches, oneof, span):
-            yield ":non-deterministic" if oneof else ":probabilistic-effects", span
-            for branch in branches:
-                yield from _in_effect(branch.effect)
-        case _:
-            assert_never(effect)
+    for part in me.walk(effect):
+        match part:
+            case me.Set(_, _, value, span):
+                if value is Truth.UNKNOWN:
+                    yield ":unknown", span
+            case me.Add(to, _, _, span):
+                yield ":rewards" if to == "reward" else ":action-costs", span
+            case me.Together():
+                pass
+            case me.When(condition, _, span):
+                yield ":conditional-effects", span
+                yield from _in_formula(condition)
+            case me.ForEach(_, _, span):
+                yield ":universal-effects", span
+            case me.Choice(_, oneof, span):
+                yield ":non-deterministic" if oneof else ":probabilistic-effects", span
+            case _:
+                assert_never(part)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
-
-from typing_extensions import assert_never
 
 from bbtc.analysis import bodies, facts, formulas, truth_words
 from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections
@@ -14,6 +11,7 @@ from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
 from bbtc.diagnostics import Related, Report
 from bbtc.kleene import Truth
+from bbtc.markov import reachable
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -183,9 +181,9 @@ def _check_stratified(names: Names, rules: tuple[md.Rule, ...]) -> None:
     """A derived predicate may depend on itself, but not on its own negation (or a test of it)."""
     reads: dict[str, dict[str, bool]] = {}
     for rule in rules:
-        for predicate, negative in _signed(rule.condition, False):
-            below = reads.setdefault(rule.predicate, {})
-            below[predicate] = below.get(predicate, False) or negative
+        for reading in mf.readings(rule.condition):
+            below, predicate = reads.setdefault(rule.predicate, {}), reading.atom.predicate
+            below[predicate] = below.get(predicate, False) or reading.value is not Truth.TRUE
     told: set[str] = set()
     for rule in rules:
         for predicate, negative in reads.get(rule.predicate, {}).items():
@@ -200,32 +198,7 @@ def _check_stratified(names: Names, rules: tuple[md.Rule, ...]) -> None:
 
 
 def _below(start: str, reads: dict[str, dict[str, bool]]) -> set[str]:
-    seen, todo = {start}, [start]
-    while todo:
-        for predicate in reads.get(todo.pop(), {}):
-            if predicate not in seen:
-                seen.add(predicate)
-                todo.append(predicate)
-    return seen
-
-
-def _signed(formula: mf.Formula, negative: bool) -> Iterator[tuple[str, bool]]:
-    match formula:
-        case mf.Atom(predicate):
-            yield predicate, negative
-        case mf.Test(_, atom):
-            yield atom.predicate, True
-        case mf.Equal():
-            return
-        case mf.Not(part):
-            yield from _signed(part, not negative)
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                yield from _signed(part, negative)
-        case mf.Quantified(_, _, part):
-            yield from _signed(part, negative)
-        case _:
-            assert_never(formula)
+    return reachable([start], lambda predicate: reads.get(predicate, ()))
 
 
 def _sensor(names: Names, node: ast.Sensor) -> md.Sensor:

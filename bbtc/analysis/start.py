@@ -41,7 +41,7 @@ def not_unknown(model: md.Model) -> Iterator[Diagnostic]:
     drawn |= {atom.predicate for clause in model.init.clauses for atom in mf.atoms(clause.condition)}
     wanted = [
         reading.atom
-        for reading in facts.readings(model.goal)
+        for reading in mf.readings(model.goal)
         if reading.value in (Truth.TRUE, None) and not any(map(mf.is_parameter, reading.atom.args))
     ]
     found = [
@@ -81,7 +81,7 @@ def _is_only_observed(model: md.Model, predicate: str) -> bool:
     asked = {
         reading.value
         for formula in conditions
-        for reading in facts.readings(formula)
+        for reading in mf.readings(formula)
         if reading.atom.predicate == predicate
     }
     return (

@@ -1,14 +1,12 @@
-"""The JSON artefacts: ground tasks and trees as text, and back."""
+"""The JSON artefacts: ground tasks and trees as text, and back. What is only written (figures, verdicts, the
+stages of a compilation) stands in modules that are imported where it is: it rests on much more."""
 
 from __future__ import annotations
 
-from bbtc.artefacts.figures_json import figures_to_json
 from bbtc.artefacts.jsontext import dumps, loads
 from bbtc.artefacts.numbers import figure_text, given_text, parse_number
-from bbtc.artefacts.stages_json import model_to_json, syntax_to_json
 from bbtc.artefacts.task_json import task_from_json, task_to_json
 from bbtc.artefacts.tree_json import tree_from_json, tree_to_json
-from bbtc.artefacts.verdict_json import verdict_to_json
 from bbtc.ground.task import Task
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import Tree
@@ -16,19 +14,15 @@ from bbtc.tree.nodes import Tree
 __all__ = [
     "dumps",
     "figure_text",
-    "figures_to_json",
     "given_text",
     "load_task",
     "load_tree",
     "loads",
-    "model_to_json",
     "parse_number",
-    "syntax_to_json",
     "task_from_json",
     "task_to_json",
     "tree_from_json",
     "tree_to_json",
-    "verdict_to_json",
 ]
 
 

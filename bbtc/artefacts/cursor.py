@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from fractions import Fraction
 from functools import partial
 from typing import TypeAlias, TypeVar
@@ -248,5 +247,7 @@ def nearest(name: str, known: Sequence[str]) -> str | None:
     """A hint with the nearest known name, if one is near."""
     if len(known) > _MOST_COMPARED:
         return None
+    from difflib import get_close_matches
+
     near = get_close_matches(name[:_LONGEST_SHOWN], known, n=1)
     return f"did you mean '{near[0]}'?" if near else None

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bbtc.artefacts.conditions import condition_to_json
 from bbtc.artefacts.numbers import figure_text
-from bbtc.belief.scenarios import Sampling, Scenario
-from bbtc.belief.simulate import Figures
 from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.kleene import Truth
-from bbtc.planner.failing_runs import FailingRun
 from bbtc.tree.nodes import Tree
+
+if TYPE_CHECKING:
+    from bbtc.belief.scenarios import Sampling, Scenario
+    from bbtc.belief.simulate import Figures
+    from bbtc.planner.failing_runs import FailingRun
 
 
 def figures_to_json(
@@ -23,10 +25,6 @@ def figures_to_json(
     """The figures, the scenarios listed, and the sampling, if there was one. Probabilities and
     expectations are exact; ``null`` is infinite, or, given success, undefined."""
     variables = tree.task.variables
-
-    def assign(values: Values) -> dict[str, str]:
-        return {v.name: Truth(value).word for v, value in zip(variables, values, strict=True)}
-
     data: dict[str, Any] = {
         "format": "bbtc-figures",
         "version": 1,
@@ -41,7 +39,7 @@ def figures_to_json(
                 "p": figure_text(share.probability),
                 "node": share.node,
                 "condition": condition_to_json(share.condition, variables) if share.condition else None,
-                "value": _truth(share.status),
+                "value": truth_of(share.status),
             }
             for share in figures.failures
         ],
@@ -55,9 +53,13 @@ def figures_to_json(
             {
                 "p": figure_text(run.probability),
                 "status": _ending(run.status),
-                "initial": assign(run.initial),
+                "initial": values_to_json(tree, run.initial),
                 "steps": [
-                    {"node": step.node.id, "action": step.node.action, "assign": assign(step.values)}
+                    {
+                        "node": step.node.id,
+                        "action": step.node.action,
+                        "assign": values_to_json(tree, step.values),
+                    }
                     for step in run.steps
                 ],
             }
@@ -72,6 +74,12 @@ def figures_to_json(
             "cut": sampling.cut,
         }
     return data
+
+
+def values_to_json(tree: Tree, values: Values) -> dict[str, str]:
+    """The value of each variable, by name."""
+    pairs = zip(tree.task.variables, values, strict=True)
+    return {variable.name: Truth(value).word for variable, value in pairs}
 
 
 def failing_run_to_json(tree: Tree, failing: FailingRun) -> dict[str, Any]:
@@ -107,7 +115,7 @@ def failing_run_to_json(tree: Tree, failing: FailingRun) -> dict[str, Any]:
         "lost": [condition_to_json(part, variables) for part in failing.lost],
         "node": stop.node,
         "condition": None if stop.condition is None else condition_to_json(stop.condition, variables),
-        "value": None if stop.status is None else _truth(stop.status),
+        "value": None if stop.status is None else truth_of(stop.status),
     }
 
 
@@ -115,7 +123,8 @@ def _ending(status: NodeStatus) -> str:
     return "blocked" if status is NodeStatus.RUNNING else status.word
 
 
-def _truth(status: NodeStatus) -> str:
+def truth_of(status: NodeStatus) -> str:
+    """What a condition was that did not succeed."""
     return "unknown" if status is NodeStatus.RUNNING else "false"
 
 

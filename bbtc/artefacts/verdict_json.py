@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bbtc.artefacts.numbers import figure_text
-from bbtc.verifier.solve import Recomputed
-from bbtc.verifier.verdict import StormFigures, Verdict
+
+if TYPE_CHECKING:
+    from bbtc.verifier.solve import Recomputed
+    from bbtc.verifier.verdict import StormFigures, Verdict
 
 _FIGURES = (
     "success",

@@ -19,9 +19,8 @@ from bbtc.ground.condition import (
     Known,
     Not,
     Or,
-    conjunction,
-    disjunction,
-    negation,
+    leaves,
+    replaced,
 )
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task, Variable, ground_name
@@ -86,25 +85,15 @@ def normal(task: Task, condition: Condition) -> Condition:
     """The condition with ``not`` pushed into the leaves and without constants, repeats, and tests
     for unknown of variables that are always known. Raises :class:`BbtcError` if it is too deep."""
     _check_depth(condition)
-    return _normal(task, condition)
 
-
-def _normal(task: Task, condition: Condition) -> Condition:
-    match condition:
-        case Is(variable, Truth.UNKNOWN) if not task.variables[variable].three_valued:
-            return FALSE
-        case Known(variable) if not task.variables[variable].three_valued:
+    def asked(leaf: Is | Known) -> Condition:
+        if task.variables[leaf.variable].three_valued:
+            return leaf
+        if isinstance(leaf, Known):
             return TRUE
-        case Is() | Known() | Constant():
-            return condition
-        case And(parts):
-            return conjunction(_normal(task, part) for part in parts)
-        case Or(parts):
-            return disjunction(_normal(task, part) for part in parts)
-        case Not(part):
-            return _normal(task, negation(part))
-        case _:
-            assert_never(condition)
+        return FALSE if leaf.value is Truth.UNKNOWN else leaf
+
+    return replaced(condition, asked)
 
 
 def written(task: Task, condition: Condition) -> Condition:
@@ -148,17 +137,12 @@ def words_of(task: Task, condition: Condition, binding: Mapping[str, str] = Mapp
 
 def can_be_unknown(task: Task, condition: Condition) -> bool:
     """Whether a condition in normal form can have the value unknown."""
-    match condition:
-        case Is(_, Truth.UNKNOWN) | Known() | Constant():
-            return False
-        case Is(variable):
-            return task.variables[variable].three_valued
-        case And(parts) | Or(parts):
-            return any(can_be_unknown(task, part) for part in parts)
-        case Not(part):
-            return can_be_unknown(task, part)
-        case _:
-            assert_never(condition)
+    return any(
+        isinstance(leaf, Is)
+        and leaf.value is not Truth.UNKNOWN
+        and task.variables[leaf.variable].three_valued
+        for leaf in leaves(condition)
+    )
 
 
 def _check_depth(condition: Condition) -> None:

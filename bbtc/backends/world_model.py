@@ -11,6 +11,7 @@ from bbtc.backends.shape import normal
 from bbtc.ground.condition import FALSE, TRUE, Condition, variables
 from bbtc.ground.task import GroundAction, Outcome, Task, effects_of
 from bbtc.kleene import Truth
+from bbtc.markov import distribution
 from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, actions_of, walk
 
 
@@ -47,11 +48,9 @@ def relevant_variables(tree: Tree) -> list[int]:
 
 def initial_values(task: Task, relevant: list[int]) -> dict[tuple[Truth, ...], Fraction]:
     """The values that some variables may start with, and how probably."""
-    merged: dict[tuple[Truth, ...], Fraction] = {}
-    for state in task.initial:
-        seen = tuple(state.values[index] for index in relevant)
-        merged[seen] = merged.get(seen, Fraction(0)) + state.probability
-    return merged
+    return distribution(
+        (tuple(state.values[index] for index in relevant), state.probability) for state in task.initial
+    )
 
 
 def changes_of(task: Task, outcome: Outcome) -> list[Changes]:

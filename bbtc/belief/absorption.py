@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from bbtc.belief.chain import Chain
-from bbtc.markov import components, solve
+from bbtc.markov import components, distribution, solve
 
 _ZERO = Fraction(0)
 _ONE = Fraction(1)
@@ -18,12 +18,9 @@ class Absorption:
 
     def __init__(self, chain: Chain) -> None:
         self.chain = chain
-        self._rows: list[dict[int, Fraction]] = []
-        for edges in chain.edges:
-            row: dict[int, Fraction] = {}
-            for edge in edges:
-                row[edge.successor] = row.get(edge.successor, _ZERO) + edge.result.probability
-            self._rows.append(row)
+        self._rows = [
+            distribution((edge.successor, edge.result.probability) for edge in edges) for edges in chain.edges
+        ]
         self._components = components([tuple(row) for row in self._rows])
         component_of = [0] * len(self._rows)
         for position, component in enumerate(self._components):

@@ -6,11 +6,12 @@ that starts an action, and that action's outcome; a state in which no action sta
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
-from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
+from bbtc.belief.state import Result, State, Transition, Values, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -46,9 +47,14 @@ class Chain:
 
 
 def explore(
-    task: Task, root: Node, limits: Limits, transitions: dict[str, Transition] | None = None
+    task: Task,
+    root: Node,
+    limits: Limits,
+    transitions: dict[str, Transition] | None = None,
+    starts: Mapping[Values, Fraction] | None = None,
 ) -> Chain:
-    """Every state the tree can reach. ``transitions`` may be shared between calls on one task.
+    """Every state the tree can reach, from the initial belief or from other ``starts`` with their
+    probabilities. ``transitions`` may be shared between calls on one task.
 
     Raises :class:`bbtc.diagnostics.LimitReached` past the limit on states or time.
     """
@@ -71,7 +77,8 @@ def explore(
             states.append(state)
         return known
 
-    initial = tuple((p, number(State(values, 0))) for values, p in initial_belief(task).items())
+    belief = initial_belief(task) if starts is None else starts
+    initial = tuple((p, number(State(values, 0))) for values, p in belief.items())
     status: list[NodeStatus] = []
     started: list[int] = []
     edges: list[tuple[Edge, ...]] = []

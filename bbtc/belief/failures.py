@@ -9,7 +9,7 @@ from bbtc.belief.tick import NodeStatus, compile_tick, memory_of
 from bbtc.ground.condition import Condition, conjuncts, evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, levels
 
 
 class Failing(NamedTuple):
@@ -35,7 +35,7 @@ class FailureFinder:
     """Finds the conditions that fail in a state, for one tree."""
 
     def __init__(self, task: Task, root: Node) -> None:
-        self._depth = _depths(root)
+        self._depth = {node.id: level for node, level in levels(root)}
         self._seen: list[tuple[ConditionNode | ActionNode, int]] = []
         self._task = task
         self._tick = compile_tick(task, root, self._observe)
@@ -98,14 +98,3 @@ class FailureFinder:
             return node.condition
         precondition = self._task.action_by_name[node.action].precondition
         return min(conjuncts(precondition), key=lambda part: evaluate(part, state.values))
-
-
-def _depths(root: Node) -> dict[str, int]:
-    depths: dict[str, int] = {}
-    stack = [(root, 0)]
-    while stack:
-        node, depth = stack.pop()
-        depths[node.id] = depth
-        if isinstance(node, ControlNode):
-            stack.extend((child, depth + 1) for child in node.children)
-    return depths

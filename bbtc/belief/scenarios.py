@@ -13,6 +13,7 @@ from bbtc.belief.chain import Chain
 from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.limits import Limits
+from bbtc.markov import distribution, reachable
 from bbtc.tree.nodes import ActionNode
 
 
@@ -83,10 +84,7 @@ def scenarios(chain: Chain, limits: Limits, *, failing: bool = False) -> Iterato
 
 def _merged(chain: Chain, state: int) -> dict[int, Fraction]:
     """Where a step leads: results that differ in cost or reward only are one."""
-    merged: dict[int, Fraction] = {}
-    for edge in chain.edges[state]:
-        merged[edge.successor] = merged.get(edge.successor, Fraction(0)) + edge.result.probability
-    return merged
+    return distribution((edge.successor, edge.result.probability) for edge in chain.edges[state])
 
 
 def _best_ends(chain: Chain, ends: Sequence[int], limits: Limits) -> dict[int, Fraction]:
@@ -118,14 +116,7 @@ def _ending(chain: Chain, ends: Sequence[int]) -> set[int]:
     for state, edges in enumerate(chain.edges):
         for edge in edges:
             before[edge.successor].append(state)
-    ending = set(ends)
-    waiting = list(ending)
-    while waiting:
-        for state in before[waiting.pop()]:
-            if state not in ending:
-                ending.add(state)
-                waiting.append(state)
-    return ending
+    return reachable(ends, before.__getitem__)
 
 
 def _scenario(chain: Chain, probability: Fraction, path: _Path) -> Scenario:

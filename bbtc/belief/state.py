@@ -10,6 +10,7 @@ from bbtc.ground.condition import compile_condition
 from bbtc.ground.task import Effect, Factor, GroundAction, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.markov import distribution
 
 Values: TypeAlias = bytes
 """The truth value of every variable of the task, by index."""
@@ -39,11 +40,7 @@ Transition: TypeAlias = Callable[[Values], tuple[Result, ...]]
 
 def initial_belief(task: Task) -> dict[Values, Fraction]:
     """The task's initial distribution over assignments, equal ones merged."""
-    belief: dict[Values, Fraction] = {}
-    for initial in task.initial:
-        values = bytes(initial.values)
-        belief[values] = belief.get(values, Fraction(0)) + initial.probability
-    return belief
+    return distribution((bytes(initial.values), initial.probability) for initial in task.initial)
 
 
 _Delta: TypeAlias = tuple[tuple[int, int], ...]

@@ -11,6 +11,7 @@ from bbtc.belief.state import State, Transition, Values, compile_action, initial
 from bbtc.belief.tick import STARTED, NodeStatus, Tick, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.markov import distribution
 from bbtc.tree.nodes import ActionNode, Node, actions_of
 
 
@@ -117,10 +118,9 @@ class Stepper:
         if action.action not in self._transitions:
             ground = self.task.action_by_name[action.action]
             self._transitions[action.action] = compile_action(ground, self.limits)
-        merged: dict[Values, Fraction] = {}
-        for result in self._transitions[action.action](state.values):
-            merged[result.values] = merged.get(result.values, Fraction(0)) + result.probability
-        return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(merged))
+        results = self._transitions[action.action](state.values)
+        after = distribution((result.values, result.probability) for result in results)
+        return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(after))
 
 
 def _branches(belief: dict[Values, Fraction]) -> tuple[Branch, ...]:

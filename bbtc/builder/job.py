@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any, Literal, TypeAlias
 
 from bbtc import pipeline
@@ -15,6 +16,7 @@ from bbtc.exit_status import OF_TREE, ExitStatus
 from bbtc.files.read_write import system_trouble
 from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.manifest.entries import Export, TreeEntry
+from bbtc.manifest.measured import Measured
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.source import SourceFile
@@ -37,7 +39,8 @@ def export_step(name: str) -> str:
 @dataclass(frozen=True, slots=True)
 class Job:
     """What to make for a tree. ``sources`` are the contents of its inputs with the names that messages give
-    them; ``tree`` is its artefact where that is up to date; ``exports`` are those that are not."""
+    them, which may be left out where nothing reads them; ``tree`` is its artefact where that is up to date;
+    ``exports`` are those that are not."""
 
     entry: TreeEntry
     sources: tuple[tuple[str, bytes], ...]
@@ -111,7 +114,10 @@ def _steps(job: Job, report: Report, watch: Watch, limits: Limits) -> Made:
     unmet: list[tuple[int, str]] = []
     if job.figures:
         figures, _ = pipeline.simulate_tree(tree, limits)
-        found = [expectation.unmet(tree, figures) for expectation in entry.expect]
+        measured = Measured(
+            tree, figures, lambda: _whole(job, text, limits), entry.perturb or Fraction(0), limits
+        )
+        found = [expectation.unmet(measured) for expectation in entry.expect]
         unmet = [(number, why) for number, why in enumerate(found) if why is not None]
         steps[FIGURES] = {}
     if unmet:
@@ -122,6 +128,14 @@ def _steps(job: Job, report: Report, watch: Watch, limits: Limits) -> Made:
         begun |= {path for path, text in files.items() if isinstance(text, Begun)}
         steps[export_step(export.name)] = {path: _bytes(text) for path, text in files.items()}
     return Made(entry.name, steps, tuple(report), summary=_summary(tree), begun=frozenset(begun))
+
+
+def _whole(job: Job, text: bytes, limits: Limits) -> Tree:
+    """The tree of an artefact on the task that it was planned for, which knows actions that the tree does
+    not."""
+    sources = [decode_source(name, data) for name, data in job.sources]
+    task = pipeline.task_of_sources(sources, Report(), limits, job.entry.reading)
+    return load_tree(SourceFile(job.entry.file, text.decode()), task)
 
 
 def _plan(job: Job, report: Report, limits: Limits, watch: Watch) -> Plan:

@@ -184,7 +184,8 @@ class _Builder:
         steps = {TREE: Step(settings_digest(tool, planned, entry.file), {}, {})}
         if entry.expect:
             expected = [expectation.text for expectation in entry.expect]
-            steps[FIGURES] = Step(settings_digest(tool, expected), {}, {})
+            rate = () if entry.perturb is None else (entry.perturb,)
+            steps[FIGURES] = Step(settings_digest(tool, expected, *rate), {}, {})
         for export in entry.exports:
             how = (export.form, versions.get(export.form), export.file, export.options)
             steps[export_step(export.name)] = Step(settings_digest(tool, how), {}, {})
@@ -218,10 +219,11 @@ class _Builder:
         if TREE not in stale:
             with contextlib.suppress(OSError):
                 tree = self.contents.read(entry.file)
-        sources = _sources(self.contents, entry) if tree is None else ()
         every = tree is None  # a new tree makes everything anew
         exports = tuple(e for e in entry.exports if every or export_step(e.name) in stale)
         figures = bool(entry.expect) and (every or FIGURES in stale)
+        read = every or (figures and any(expectation.disturbed for expectation in entry.expect))
+        sources = _sources(self.contents, entry) if read else ()
         return Job(_without_places(entry), sources, tree, figures, exports)
 
     # --- what was made -----------------------------------------------------------------------

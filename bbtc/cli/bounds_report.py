@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from bbtc.artefacts.numbers import exact, figure_text
 from bbtc.cli.counting import counted
 from bbtc.cli.wording import at, block_line, oneof_note, steps_of, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
-from bbtc.planner.bounds import TaskValue
-from bbtc.planner.why_not import DeadEnd
 from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
+
+if TYPE_CHECKING:
+    from bbtc.planner.bounds import TaskValue
+    from bbtc.planner.why_not import DeadEnd
 
 _MOST_ENDS = 10  # dead ends told
 _MOST_BLOCKS = 3  # causes told of one of them

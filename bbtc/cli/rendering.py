@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from bbtc.codes import CODES, Code
 from bbtc.diagnostics import Diagnostic, Severity
-from bbtc.pages import page
+from bbtc.pages import page, site
 from bbtc.printable import escaped, printable_line
 from bbtc.source import Span
 from bbtc.version import __version__
@@ -74,6 +74,7 @@ def _uri(name: str) -> str:
 
 def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
     codes = sorted({d.code for d in diagnostics})
+    published = site() if codes else None
     return {
         "$schema": SARIF_SCHEMA,
         "version": "2.1.0",
@@ -83,7 +84,7 @@ def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
                     "driver": {
                         "name": "bbtc",
                         "version": __version__,
-                        "rules": [_sarif_rule(CODES[code]) for code in codes],
+                        "rules": [_sarif_rule(CODES[code], published) for code in codes],
                     }
                 },
                 "columnKind": "unicodeCodePoints",
@@ -93,12 +94,14 @@ def _as_sarif(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
     }
 
 
-def _sarif_rule(code: Code) -> dict[str, object]:
-    """What is known of a code. Its page is part of it: it can be read where the pages are not at hand."""
+def _sarif_rule(code: Code, published: str | None) -> dict[str, object]:
+    """What is known of a code. Its page is part of it: it can be read where the pages are not at hand. Its
+    address is told only where it is published: the ``helpUri`` of SARIF is absolute."""
     text = page(code.code)
     return {
         "id": code.code,
         "shortDescription": {"text": code.title},
+        **({"helpUri": code.help_uri(published)} if published else {}),
         "help": {"text": text, "markdown": text},
         "defaultConfiguration": {"level": code.severity.value},
     }

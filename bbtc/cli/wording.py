@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from bbtc.artefacts.numbers import exact
-from bbtc.belief.scenarios import Scenario
-from bbtc.belief.simulate import Figures
 from bbtc.belief.tick import NodeStatus
 from bbtc.cli.counting import counted
 from bbtc.ground.condition import Condition
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
-from bbtc.planner.failing_runs import FailingRun
-from bbtc.planner.result import Plan, Refinement
-from bbtc.planner.why_not import Block
 from bbtc.printable import printable
 from bbtc.source import Span
 from bbtc.tree.nodes import Tree, retries_of, walk
+
+if TYPE_CHECKING:
+    from bbtc.belief.scenarios import Scenario
+    from bbtc.belief.simulate import Figures
+    from bbtc.planner.failing_runs import FailingRun
+    from bbtc.planner.result import Plan, Refinement
+    from bbtc.planner.why_not import Block
 
 _MOST_NAMED = 5  # actions named of many
 _MOST_BLOCKS = 3  # causes told of one run
@@ -112,7 +115,7 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     if figures.endless:
         lines.append(f"endless   {exact(figures.endless)}")
     for share in figures.failures:
-        what = _stopped(tree, share.node, share.condition, share.status)
+        what = stopped(tree, share.node, share.condition, share.status)
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")
     lines.append(f"cost      {expected(figures.cost, figures.cost_given_success)}")
     lines.append(f"actions   {expected(figures.actions, figures.actions_given_success)}")
@@ -125,7 +128,7 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     return lines
 
 
-def _stopped(tree: Tree, node: str, condition: Condition | None, status: NodeStatus) -> str:
+def stopped(tree: Tree, node: str, condition: Condition | None, status: NodeStatus) -> str:
     """What stopped a run at a node, in words."""
     if condition is not None:
         word = "unknown" if status is NodeStatus.RUNNING else "false"
@@ -149,7 +152,7 @@ def failing_lines(tree: Tree, runs: Sequence[FailingRun], rest: Fraction) -> lis
             whys = [f"no action of the tree can bring about {lost}"]
         if not whys:
             node, condition = each.stop.node or tree.root.id, each.stop.condition
-            what = _stopped(tree, node, condition, status if each.stop.status is None else each.stop.status)
+            what = stopped(tree, node, condition, status if each.stop.status is None else each.stop.status)
             whys = [f"{what}, node {node}: the goal may be in reach, but the tree has nothing left to try"]
         lines.append(f"  {exact(each.run.probability)}{ending}: {whys[0]}")
         lines.extend(f"    and {why}" for why in whys[1:])

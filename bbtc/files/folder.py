@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import stat
 import sys
 from collections.abc import Iterator
@@ -183,7 +182,7 @@ class Folder:
     def _new_file(self) -> tuple[str, int]:
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_FOLLOW | _COMMON
         while True:
-            name = TEMPORARY + secrets.token_hex(8)
+            name = TEMPORARY + os.urandom(8).hex()
             path, relative = self.where(name)
             with contextlib.suppress(FileExistsError):
                 return name, os.open(path, flags, 0o666, dir_fd=relative)
@@ -310,7 +309,7 @@ class Batch:
     def _keep(self, each: _Aside) -> None:
         """Give what stands in the place of a file a second name, where there are several files."""
         if len(self._aside) > 1 and each.replaces:
-            old = TEMPORARY + secrets.token_hex(8)
+            old = TEMPORARY + os.urandom(8).hex()
             with contextlib.suppress(OSError, NotImplementedError):  # not every file system can
                 each.to.link(each.new, each.folder, old)
                 each.old = old

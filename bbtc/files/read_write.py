@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import errno
 import os
 import stat
@@ -364,6 +363,8 @@ def _difference(path: str, old: str, new: str) -> tuple[str, tuple[str, ...]]:
         return f", first in line {first + 1}", ()
     if bare[-1] == wanted[-1] == "":  # both end with a line end: no empty line follows it
         bare, wanted = bare[:-1], wanted[:-1]
+    import difflib
+
     shown = printable(path)
     diff = difflib.unified_diff(bare, wanted, shown, f"{shown} (as it would be)", lineterm="")
     return ":", tuple(diff)

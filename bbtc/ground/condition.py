@@ -139,18 +139,40 @@ def conjuncts(condition: Condition) -> tuple[Condition, ...]:
     return () if condition == TRUE else (condition,)
 
 
-def variables(condition: Condition) -> Iterator[int]:
-    """Indices of the variables a condition reads, repeats included, from left to right."""
+def leaves(condition: Condition) -> Iterator[Is | Known]:
+    """What a condition reads, repeats included, from left to right."""
     match condition:
-        case Is(variable) | Known(variable):
-            yield variable
+        case Is() | Known():
+            yield condition
         case And(parts) | Or(parts):
             for part in parts:
-                yield from variables(part)
+                yield from leaves(part)
         case Not(part):
-            yield from variables(part)
+            yield from leaves(part)
         case Constant():
             return
+        case _:
+            assert_never(condition)
+
+
+def variables(condition: Condition) -> Iterator[int]:
+    """Indices of the variables a condition reads, repeats included, from left to right."""
+    return (leaf.variable for leaf in leaves(condition))
+
+
+def replaced(condition: Condition, leaf: Callable[[Is | Known], Condition]) -> Condition:
+    """The condition in negation normal form, without constants and repeats, with other leaves."""
+    match condition:
+        case Is() | Known():
+            return leaf(condition)
+        case And(parts):
+            return conjunction(replaced(part, leaf) for part in parts)
+        case Or(parts):
+            return disjunction(replaced(part, leaf) for part in parts)
+        case Not(part):
+            return replaced(negation(part), leaf)
+        case Constant():
+            return condition
         case _:
             assert_never(condition)
 

@@ -216,19 +216,8 @@ def _conditions(model: md.Model) -> Iterator[mf.Formula]:
     yield from (rule.condition for rule in model.rules)
     if model.goal is not None:
         yield model.goal
-    bodies = [template.body for template in model.templates.values()]
-    for body in bodies:  # grows while it is read
-        match body:
-            case md.BodyCondition(condition):
-                yield condition
-            case md.BodyControl(_, children):
-                bodies.extend(children)
-            case md.BodyForeach(_, child):
-                bodies.append(child)
-            case md.BodyCall():
-                pass
-            case _:
-                assert_never(body)
+    for template in model.templates.values():
+        yield from md.conditions(template.body)
 
 
 def _args(model: md.Model, universe: Universe, fact: Fact) -> tuple[str, ...]:

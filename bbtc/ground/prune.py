@@ -1,15 +1,21 @@
-"""Leaves out of a task what cannot matter to its goal."""
+"""Leaves out of a task with templates what cannot matter to its goal.
+
+What the body of a template calls, and with which arguments, is known only once it is made; without
+templates :mod:`bbtc.ground.relevance` tells from argument rows, before anything is made.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
 from bbtc.ground import task as gt
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
 from bbtc.ground.effects import arrange, merge_outcomes
+from bbtc.markov import distribution, reachable
 
 
 def prune(task: gt.Task) -> gt.Task:
@@ -22,14 +28,13 @@ def prune(task: gt.Task) -> gt.Task:
     then all its body is kept.
     Outcomes that become equal are merged. Under a reward metric actions with rewards are kept too.
     """
-    relevance = _Relevance(task)
-    relevance.close()
-    kept = relevance.variables
-    actions = [task.actions[index] for index in sorted(relevance.actions)]
-    templates = [task.templates[index] for index in sorted(relevance.templates)]
+    relevant = _relevant(task)
+    actions = [each for index, each in enumerate(task.actions) if ("action", index) in relevant]
+    templates = [each for index, each in enumerate(task.templates) if ("template", index) in relevant]
+    kept = [index for index in range(len(task.variables)) if ("variable", index) in relevant]
     if len(actions) < len(task.actions) or len(templates) < len(task.templates):
         task = replace(task, actions=tuple(actions), templates=tuple(templates))
-    return task if len(kept) == len(task.variables) else reordered(task, sorted(kept))
+    return task if len(kept) == len(task.variables) else reordered(task, kept)
 
 
 def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
@@ -37,16 +42,13 @@ def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
     Those that effects set keep their order."""
     renumber = {old: new for new, old in enumerate(order)}
     mapper = _Mapper(renumber)
-    initial: dict[tuple[object, ...], gt.InitialState] = {}
-    for state in task.initial:
-        values = tuple(state.values[old] for old in renumber)
-        before = initial.get(values)
-        more = before.probability if before is not None else 0
-        initial[values] = gt.InitialState(state.probability + more, values)
+    initial = distribution(
+        (tuple(state.values[old] for old in renumber), state.probability) for state in task.initial
+    )
     return replace(
         task,
         variables=tuple(task.variables[old] for old in renumber),
-        initial=tuple(initial.values()),
+        initial=tuple(gt.InitialState(probability, values) for values, probability in initial.items()),
         goal=mapper.condition(task.goal),
         actions=tuple(map(mapper.action, task.actions)),
         templates=tuple(map(mapper.template, task.templates)),
@@ -55,94 +57,61 @@ def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
 
 # --- relevance -------------------------------------------------------------------------------
 
-
-class _Relevance:
-    """The least sets of variables, actions and templates (by index) that matter."""
-
-    def __init__(self, task: gt.Task) -> None:
-        self.task = task
-        self.variables: set[int] = set()
-        self.actions: set[int] = set()
-        self.templates: set[int] = set()
-        self._fresh: list[int] = []
-        self._action_index = {action.name: index for index, action in enumerate(task.actions)}
-        self._template_index = {template.name: index for index, template in enumerate(task.templates)}
-        # For each variable: the actions and templates that set it, with the guard they set it under.
-        self._action_setters: dict[int, list[tuple[int, Condition | None]]] = {}
-        self._template_setters: dict[int, list[tuple[int, Condition | None]]] = {}
-        for index, action in enumerate(task.actions):
-            for guard, variable in _settings(action.factors):
-                self._action_setters.setdefault(variable, []).append((index, guard))
-        for index, template in enumerate(task.templates):
-            for guard, variable in _settings(template.factors):
-                self._template_setters.setdefault(variable, []).append((index, guard))
-
-    def close(self) -> None:
-        """Start from the goal (and rewards, if they are the metric) and follow everything up."""
-        self._read(self.task.goal)
-        if self.task.metric == "reward":
-            for index, action in enumerate(self.task.actions):
-                if any(map(_earns, gt.outcomes_of(action.factors))):
-                    self._keep_action(index)
-        while self._fresh:
-            variable = self._fresh.pop()
-            for index, guard in self._action_setters.get(variable, ()):
-                self._keep_action(index)
-                self._read(guard)
-            for index, guard in self._template_setters.get(variable, ()):
-                self._keep_template(index)
-                self._read(guard)
-
-    def _read(self, condition: Condition | None) -> None:
-        if condition is not None:
-            for variable in variables(condition):
-                if variable not in self.variables:
-                    self.variables.add(variable)
-                    self._fresh.append(variable)
-
-    def _keep_action(self, index: int) -> None:
-        if index not in self.actions:
-            self.actions.add(index)
-            action = self.task.actions[index]
-            self._read(action.precondition)
-            self._read_charges(action.factors)
-
-    def _read_charges(self, factors: Iterable[gt.Factor]) -> None:
-        for charge in gt.charges_of(factors):
-            self._read(charge.when)
-
-    def _keep_template(self, index: int) -> None:
-        todo = [index]
-        while todo:
-            current = todo.pop()
-            if current in self.templates:
-                continue
-            self.templates.add(current)
-            template = self.task.templates[current]
-            self._read(template.precondition)
-            self._read_charges(template.factors)
-            for part in gt.walk_body(template.body):
-                match part:
-                    case gt.BodyCondition(condition):
-                        self._read(condition)
-                    case gt.BodyAction(action):
-                        self._keep_action(self._action_index[action])
-                    case gt.BodyTemplate(called):
-                        todo.append(self._template_index[called])
-                    case gt.BodyControl():
-                        pass
-                    case _:
-                        assert_never(part)
+_Node: TypeAlias = tuple[Literal["variable", "action", "template"], int]
 
 
-def _earns(outcome: gt.Outcome) -> bool:
-    return bool(outcome.reward) or any(charge.reward for charge in outcome.charges)
+def _relevant(task: gt.Task) -> set[_Node]:
+    """What can be reached from the goal where a variable leads to what sets it and to the guards of that, and
+    an action or a template to what it reads and calls."""
+    actions = {action.name: index for index, action in enumerate(task.actions)}
+    templates = {template.name: index for index, template in enumerate(task.templates)}
+    setters: dict[int, list[_Node]] = {}
+    owners: list[tuple[_Node, tuple[gt.Factor, ...]]] = [
+        *((("action", index), action.factors) for index, action in enumerate(task.actions)),
+        *((("template", index), template.factors) for index, template in enumerate(task.templates)),
+    ]
+    for owner, factors in owners:
+        for effect in gt.effects_of(factors):
+            for variable, _ in effect.sets:
+                setters.setdefault(variable, []).extend([owner, *_read(effect.when)])
+
+    def leads(node: _Node) -> Iterator[_Node]:
+        kind, index = node
+        if kind == "variable":
+            yield from setters.get(index, ())
+            return
+        each = task.actions[index] if kind == "action" else task.templates[index]
+        yield from _read(each.precondition)
+        for charge in gt.charges_of(each.factors):
+            yield from _read(charge.when)
+        for part in gt.walk_body(each.body) if isinstance(each, gt.GroundTemplate) else ():
+            match part:
+                case gt.BodyCondition(condition):
+                    yield from _read(condition)
+                case gt.BodyAction(action):
+                    yield "action", actions[action]
+                case gt.BodyTemplate(called):
+                    yield "template", templates[called]
+                case gt.BodyControl():
+                    pass
+                case _:
+                    assert_never(part)
+
+    start = list(_read(task.goal))
+    if task.metric == "reward":
+        start += [node for node, factors in owners if node[0] == "action" and _earns(factors)]
+    return reachable(start, leads)
 
 
-def _settings(factors: Iterable[gt.Factor]) -> Iterator[tuple[Condition | None, int]]:
-    for effect in gt.effects_of(factors):
-        for variable, _ in effect.sets:
-            yield effect.when, variable
+def _read(condition: Condition | None) -> Iterator[_Node]:
+    return (("variable", number) for number in (() if condition is None else variables(condition)))
+
+
+def _earns(factors: Iterable[gt.Factor]) -> bool:
+    return any(
+        outcome.reward or any(charge.reward for charge in outcome.charges)
+        for outcome in gt.outcomes_of(factors)
+    )
 
 
 # --- leaving out -----------------------------------------------------------------------------

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from typing_extensions import assert_never
-
 from bbtc.diagnostics import Diagnostic
 from bbtc.model import domain as md
 from bbtc.model import effect as me
@@ -42,14 +40,6 @@ def refused(model: md.Model) -> Iterator[Diagnostic]:
 
 def has_oneof(effect: me.Effect) -> bool:
     """Does a draw of the start leave open how likely its results are?"""
-    match effect:
-        case me.Choice(branches, oneof):
-            return (oneof and len(branches) > 1) or any(has_oneof(branch.effect) for branch in branches)
-        case me.Together(parts):
-            return any(map(has_oneof, parts))
-        case me.ForEach(_, inner) | me.When(_, inner):
-            return has_oneof(inner)
-        case me.Set() | me.Add():
-            return False
-        case _:
-            assert_never(effect)
+    return any(
+        isinstance(part, me.Choice) and part.oneof and len(part.branches) > 1 for part in me.walk(effect)
+    )

@@ -1,7 +1,8 @@
 """Which actions and variables can matter to the goal, found before any action is made.
 
 This is the backward relevance of :mod:`bbtc.ground.prune` on argument rows, for tasks without
-templates: a task with a million actions is then made once, with what matters only.
+templates: a task with a million actions is then made once, with what matters only. It shares no code with
+that, which needs a node for each action: here there are arrays of rows, looked at thousands at a time.
 """
 
 from __future__ import annotations

@@ -30,7 +30,8 @@ class TreeEntry:
     """A tree of the project: what it is made from, how, into which files, and what is expected of it.
 
     ``inputs`` and ``file`` are relative to the project's folder. ``limits`` are fields of
-    :class:`bbtc.limits.Limits`; ``target`` None stands for the problem's own.
+    :class:`bbtc.limits.Limits`; ``target`` None stands for the problem's own. ``perturb`` is the rate of
+    perturbed runs, for what is expected of those.
     """
 
     name: str
@@ -45,6 +46,7 @@ class TreeEntry:
     limits: tuple[tuple[str, int | None], ...] = ()
     exports: tuple[Export, ...] = ()
     expect: tuple[Expectation, ...] = ()
+    perturb: Fraction | None = None
     span: Span | None = field(default=None, compare=False)
     input_spans: tuple[Span | None, ...] = field(default=(), compare=False)
     """Where the manifest names the inputs."""

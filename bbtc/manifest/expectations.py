@@ -11,21 +11,26 @@ from types import MappingProxyType
 
 from bbtc.artefacts.cursor import clip, nearest
 from bbtc.artefacts.numbers import exact, parse_written
-from bbtc.belief.simulate import Figures
+from bbtc.manifest.measured import Measured
 from bbtc.source import Span
-from bbtc.tree.nodes import Tree, walk
+from bbtc.tree.nodes import walk
 
-FIGURES: Mapping[str, Callable[[Tree, Figures], Fraction | int | None]] = MappingProxyType(
+FIGURES: Mapping[str, Callable[[Measured], Fraction | int | None]] = MappingProxyType(
     {
-        "success": lambda _, figures: figures.success,
-        "failure": lambda _, figures: figures.failure,
-        "blocked": lambda _, figures: figures.blocked,
-        "endless": lambda _, figures: figures.endless,
-        "cost": lambda _, figures: figures.cost,
-        "cost-given-success": lambda _, figures: figures.cost_given_success,
-        "actions": lambda _, figures: figures.actions,
-        "actions-given-success": lambda _, figures: figures.actions_given_success,
-        "nodes": lambda tree, _: sum(1 for _ in walk(tree.root)),
+        "success": lambda found: found.figures.success,
+        "failure": lambda found: found.figures.failure,
+        "blocked": lambda found: found.figures.blocked,
+        "endless": lambda found: found.figures.endless,
+        "cost": lambda found: found.figures.cost,
+        "cost-given-success": lambda found: found.figures.cost_given_success,
+        "actions": lambda found: found.figures.actions,
+        "actions-given-success": lambda found: found.figures.actions_given_success,
+        "nodes": lambda found: sum(1 for _ in walk(found.tree.root)),
+        "recovery": lambda found: found.recovery.mean,
+        "recovery-worst": lambda found: found.recovery_worst,
+        "perturbed-success": lambda found: found.perturbed.success,
+        "perturbed-missed": lambda found: Fraction(found.perturbed.missed, found.perturbed.runs),
+        "perturbed-unready": lambda found: found.perturbed.unready,
     }
 )
 """What can be expected of a tree; None stands for infinite or undefined."""
@@ -46,10 +51,20 @@ class Expectation:
     text: str
     span: Span | None = field(default=None, compare=False)
 
-    def unmet(self, tree: Tree, figures: Figures) -> str | None:
+    @property
+    def disturbed(self) -> bool:
+        """Is it about a world that others change? Then all actions of the task matter."""
+        return self.figure.startswith("recovery") or self.perturbed
+
+    @property
+    def perturbed(self) -> bool:
+        """Is it about perturbed runs, which have a rate?"""
+        return self.figure.startswith("perturbed")
+
+    def unmet(self, found: Measured) -> str | None:
         """What the figure is instead; None where the expectation is met. Exact; a figure that is
         infinite or undefined meets nothing."""
-        value = FIGURES[self.figure](tree, figures)
+        value = FIGURES[self.figure](found)
         if value is None:
             return f"{self.figure} is infinite or undefined"
         if _OPERATORS[self.comparison](Fraction(value), self.number):

@@ -36,7 +36,7 @@ MOST_VALUES = 250_000
 _INPUTS = ("domain", "problem")
 _READING = ("problem-name", "lenient")
 _PLANNING = ("target", "strategy", "max-actions", "retries", "guarded", "limits")
-_SETTINGS = (*_INPUTS, *_READING, *_PLANNING, "exports", "expect")
+_SETTINGS = (*_INPUTS, *_READING, *_PLANNING, "exports", "expect", "perturb")
 _LIMITS = {"time": "seconds", "states": "states", "nodes": "nodes", "ground-actions": "actions"}
 
 
@@ -116,7 +116,7 @@ class _Reader:
                 self.shared[key] = attempt(lambda: read(found[key]), default)
             return cast("_T", self.shared[key])
 
-        return TreeEntry(
+        entry = TreeEntry(
             name=name,
             inputs=inputs,
             file=file,
@@ -129,9 +129,16 @@ class _Reader:
             limits=optional("limits", self._limits, ()),
             exports=optional("exports", lambda each: self._exports(each, name), ()),
             expect=optional("expect", self._expectations, ()),
+            perturb=optional("perturb", _target, None),
             span=self.marked.span(at.path),
             input_spans=tuple(self.marked.span(each.path) for each in given),
         )
+        if entry.perturb is None and any(expectation.perturbed for expectation in entry.expect):
+            hint = "say how often something changes, such as `perturb: 5%`"
+            self.faults.add(
+                at.found("BBT0603", "perturbed runs are expected, but field 'perturb' is missing", hint)
+            )
+        return entry
 
     def _limits(self, at: At) -> tuple[tuple[str, int | None], ...]:
         members = self._members(at, [], list(_LIMITS))

@@ -198,20 +198,29 @@ class Model:
     problem_span: Span | None = field(default=None, compare=False, repr=False)
 
 
-def calls(body: Body) -> Iterator[BodyCall]:
-    """The calls in a body, from left to right."""
+def walk(body: Body) -> Iterator[Body]:
+    """Every part of a body, parents first, from left to right."""
+    yield body
     match body:
-        case BodyCall():
-            yield body
         case BodyControl(_, children):
             for child in children:
-                yield from calls(child)
+                yield from walk(child)
         case BodyForeach(_, child):
-            yield from calls(child)
-        case BodyCondition():
+            yield from walk(child)
+        case BodyCall() | BodyCondition():
             return
         case _:
             assert_never(body)
+
+
+def calls(body: Body) -> Iterator[BodyCall]:
+    """The calls in a body."""
+    return (part for part in walk(body) if isinstance(part, BodyCall))
+
+
+def conditions(body: Body) -> Iterator[Formula]:
+    """The conditions in a body, without those of what it calls."""
+    return (part.condition for part in walk(body) if isinstance(part, BodyCondition))
 
 
 def set_values(model: Model) -> dict[str, set[Truth]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, TypeAlias
@@ -113,23 +113,29 @@ Effect: TypeAlias = Set | Together | When | ForEach | Choice | Add
 NOTHING = Together(())
 
 
-def leaves(effect: Effect, *, possible: bool = False) -> Iterator[Set | Add]:
-    """Everything the effect does somewhere, from left to right; with ``possible``, but for branches of
-    probability 0."""
+def walk(effect: Effect, *, possible: bool = False) -> Iterator[Effect]:
+    """Every part of an effect, parents first, from left to right; with ``possible``, without what stands in
+    branches of probability 0."""
+    yield effect
+    inner: Iterable[Effect]
     match effect:
         case Set() | Add():
-            yield effect
+            inner = ()
         case Together(parts):
-            for part in parts:
-                yield from leaves(part, possible=possible)
-        case When(_, inner) | ForEach(_, inner):
-            yield from leaves(inner, possible=possible)
+            inner = parts
+        case When(_, part) | ForEach(_, part):
+            inner = (part,)
         case Choice(branches):
-            for branch in branches:
-                if branch.probability > 0 or not possible:
-                    yield from leaves(branch.effect, possible=possible)
+            inner = (branch.effect for branch in branches if branch.probability > 0 or not possible)
         case _:
             assert_never(effect)
+    for part in inner:
+        yield from walk(part, possible=possible)
+
+
+def leaves(effect: Effect, *, possible: bool = False) -> Iterator[Set | Add]:
+    """Everything the effect does somewhere; ``possible`` as in :func:`walk`."""
+    return (part for part in walk(effect, possible=possible) if isinstance(part, Set | Add))
 
 
 def settings(effect: Effect) -> Iterator[Set]:
@@ -144,22 +150,7 @@ def earns(effect: Effect) -> bool:
 
 def conditions(effect: Effect) -> Iterator[Formula]:
     """The conditions of every ``when`` in the effect."""
-    match effect:
-        case Set() | Add():
-            return
-        case Together(parts):
-            for part in parts:
-                yield from conditions(part)
-        case When(condition, inner):
-            yield condition
-            yield from conditions(inner)
-        case ForEach(_, inner):
-            yield from conditions(inner)
-        case Choice(branches):
-            for branch in branches:
-                yield from conditions(branch.effect)
-        case _:
-            assert_never(effect)
+    return (part.condition for part in walk(effect) if isinstance(part, When))
 
 
 def substitute(effect: Effect, binding: dict[str, Term]) -> Effect:

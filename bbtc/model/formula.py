@@ -12,6 +12,7 @@ from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
+from bbtc.kleene import Truth
 from bbtc.model.types import Parameter
 from bbtc.source import Span
 
@@ -96,22 +97,39 @@ def conjoin(first: Formula | None, second: Formula | None) -> Formula | None:
     return And((first, second))
 
 
-def atoms(formula: Formula) -> Iterator[Atom]:
-    """The atoms a formula reads, tests included, from left to right."""
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """An atom in a condition. ``value`` is what makes the condition true; None for ``known``."""
+
+    atom: Atom
+    value: Truth | None
+    span: Span | None
+
+
+def readings(formula: Formula, negative: bool = False) -> Iterator[Reading]:
+    """Every atom of a condition, with the value that helps to make it true."""
     match formula:
-        case Atom():
-            yield formula
-        case Test(_, atom):
-            yield atom
+        case Atom(_, _, span):
+            yield Reading(formula, Truth.FALSE if negative else Truth.TRUE, span)
+        case Test(kind, atom, span):
+            unknown = (kind == "unknown") is not negative
+            yield Reading(atom, Truth.UNKNOWN if unknown else None, span)
         case Equal():
             return
-        case Not(part) | Quantified(_, _, part):
-            yield from atoms(part)
+        case Not(part):
+            yield from readings(part, not negative)
         case And(parts) | Or(parts):
-            for each in parts:
-                yield from atoms(each)
+            for part in parts:
+                yield from readings(part, negative)
+        case Quantified(_, _, part):
+            yield from readings(part, negative)
         case _:
             assert_never(formula)
+
+
+def atoms(formula: Formula) -> Iterator[Atom]:
+    """The atoms a formula reads, tests included, from left to right."""
+    return (reading.atom for reading in readings(formula))
 
 
 def substitute(formula: Formula, binding: dict[str, Term]) -> Formula:

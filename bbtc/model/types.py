@@ -48,27 +48,30 @@ class TypeHierarchy:
     types: Mapping[str, Type]
 
     @cached_property
-    def ancestors(self) -> Mapping[str, frozenset[str]]:
-        """Every type a type is a subtype of, itself and ``object`` included."""
-        known: dict[str, frozenset[str]] = {}
-        for name in self.types:
+    def _known(self) -> dict[str, frozenset[str]]:
+        """The ancestors that were asked for: all of them would be very many where types form a long chain."""
+        return {}
+
+    def ancestors(self, name: str) -> frozenset[str]:
+        """Every type that a type is a subtype of, itself and ``object`` included."""
+        if name not in self._known:
             # Depth first without recursion: a hierarchy may be deeper than the Python stack.
             seen = {name, OBJECT}
             todo = [name]
             while todo:
                 for parent in self.types[todo.pop()].parents:
                     if parent not in seen:
-                        if parent in known:
-                            seen |= known[parent]
+                        if parent in self._known:
+                            seen |= self._known[parent]
                         else:
                             seen.add(parent)
                             todo.append(parent)
-            known[name] = frozenset(seen)
-        return known
+            self._known[name] = frozenset(seen)
+        return self._known[name]
 
     def is_subtype(self, name: str, of: Iterable[str]) -> bool:
         """Whether every object of the type is of one of the other types."""
-        return not self.ancestors[name].isdisjoint(of)
+        return not self.ancestors(name).isdisjoint(of)
 
     def fits(self, parameter: Iterable[str], wanted: Iterable[str]) -> bool:
         """Whether everything a parameter of the given types takes is of one of ``wanted``."""

@@ -5,14 +5,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from bbtc.belief.chain import Chain
 from bbtc.belief.failures import FailureFinder, Stop
 from bbtc.belief.scenarios import Scenario, scenarios
 from bbtc.ground.condition import Condition
 from bbtc.limits import Limits
-from bbtc.planner.why_not import Block, RootFinder
 from bbtc.tree.nodes import Tree
+
+if TYPE_CHECKING:
+    from bbtc.planner.why_not import Block
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,13 @@ def failing_runs(tree: Tree, chain: Chain, limits: Limits, most: int) -> Iterato
     :class:`bbtc.diagnostics.LimitReached`."""
     if most <= 0:
         return
+    runs = itertools.islice(scenarios(chain, limits, failing=True), most)
+    first = next(runs, None)
+    if first is None:
+        return
+    from bbtc.planner.why_not import RootFinder
+
     roots, finder = RootFinder(tree.task, limits), FailureFinder(tree.task, tree.root)
-    for run in itertools.islice(scenarios(chain, limits, failing=True), most):
+    for run in itertools.chain([first], runs):
         stop = finder.stopped(chain.states[run.end])
         yield FailingRun(run, roots.blocks(run.final), tuple(roots.lost(run.final)), stop)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import types
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 from xml.etree import ElementTree as ET
 
 from bbtc.backends.btcpp.exporter import btcpp
@@ -14,18 +14,7 @@ from bbtc.backends.names import Symbol
 from bbtc.backends.pytrees.exporter import py_trees, py_trees_names
 from bbtc.ground.task import Task, ground_name
 from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing, World
-from bbtc.replay.ticks import Tick, TickScript, TickWorld
 from bbtc.tree.nodes import Tree
-
-
-class Engine(Protocol):
-    """A tree in an engine, ready to run any number of scripts."""
-
-    source: str
-
-    def runs(self, jobs: Iterable[tuple[Script, Timing]]) -> list[Run]: ...
-
-    def trace(self, script: TickScript) -> list[Tick]: ...
 
 
 class Replay(ABC):
@@ -54,20 +43,6 @@ class Replay(ABC):
     def runs(self, jobs: Iterable[tuple[Script, Timing]]) -> list[Run]:
         """Replay many scripts."""
         return [self.run(script, timing) for script, timing in jobs]
-
-    def trace(self, script: TickScript) -> list[Tick]:
-        """What happens in every tick of a script in a new tree, until it ends."""
-        world = TickWorld(self.task, script)
-        self.begin(world, haltable=True)
-        for number in range(len(script.before)):
-            world.next_tick()
-            status = self.tick()
-            world.tick_ended(status)
-            if status != "running":
-                break
-            if number in script.halts:
-                self.halt()
-        return world.ticks
 
     @property
     @abstractmethod

@@ -18,7 +18,7 @@ from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.markov import components
+from bbtc.markov import components, distribution
 from bbtc.tree.nodes import ActionNode, ControlNode, Node, actions_of
 
 _MOST_ATTEMPTS = 4096
@@ -113,9 +113,7 @@ def _expected_attempts(task: Task, root: Node, target: Fraction, limits: Limits)
     """The least number of actions within which the tree succeeds with the target probability; this
     is the number of attempts to ask for at the root, but for odd trees. 1 if there is none."""
     chain = explore(task, root, limits)
-    mass: dict[int, Fraction] = {}
-    for probability, state in chain.initial:
-        mass[state] = mass.get(state, Fraction(0)) + probability
+    mass = distribution((state, probability) for probability, state in chain.initial)
     won = Fraction(0)
     for steps in range(_MOST_ATTEMPTS):
         following: dict[int, Fraction] = {}

@@ -10,11 +10,12 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import Generic, NamedTuple, TypeAlias, TypeVar, cast
 
 from bbtc.source import SourceFile, Span
 from bbtc.syntax.tables import END, FLAGS, Production, Tables
 
+_T = TypeVar("_T")
 _SPACE = re.compile(r"\s*", FLAGS)
 _tuple = tuple.__new__
 
@@ -56,11 +57,12 @@ class TooDeep(Exception):
     """The stack of states is higher than allowed."""
 
 
-class Engine:
-    """A parser for one grammar.
+class Engine(Generic[_T]):
+    """A parser for one grammar; what the method of the start rule returns is a ``_T``.
 
     ``builder`` has a method for every rule or alias. The method takes the rule's children: tokens, what the
-    methods of other rules returned, and a list for ``item*`` or ``item+``.
+    methods of other rules returned, and a list for ``item*`` or ``item+``. To the engine all of them are
+    objects: a test holds the types of the methods to the productions of the grammar.
     """
 
     def __init__(self, tables: Tables, builder: object) -> None:
@@ -72,7 +74,7 @@ class Engine:
         self._scanners: dict[int, _Scanner] = {}
         self._compiled: dict[frozenset[str], _Scanner] = {}
 
-    def parse(self, text: str, source: SourceFile, max_stack: int = sys.maxsize) -> Any:
+    def parse(self, text: str, source: SourceFile, max_stack: int = sys.maxsize) -> _T:
         """The value of the start rule for a text, whose characters stand where those of the source do.
 
         Raises :class:`Unexpected` for a syntax error, and :class:`TooDeep` where the stack of states
@@ -81,14 +83,14 @@ class Engine:
         actions, goto, reductions, scanners = self._actions, self._goto, self._reductions, self._scanners
         token_of, state, end = tuple.__new__, self._start, self._end
         states: list[int] = [state]
-        values: list[Any] = []
+        values: list[object] = []
         position = _SPACE.match(text).end()  # type: ignore[union-attr]
         while True:
             match = (scanners.get(state) or self._scanner(state))(text, position)
             if match is not None:
-                kind: Any = match.lastgroup
+                kind: str = match.lastgroup  # type: ignore[assignment]  # every terminal is a group
                 start, stop = match.span(match.lastindex or 0)
-                token = token_of(Token, (kind, text[start:stop], start, stop, source))
+                token: Token | None = token_of(Token, (kind, text[start:stop], start, stop, source))
             elif position == len(text):
                 kind, token = END, None
             else:
@@ -104,7 +106,7 @@ class Engine:
                     # `list: list item` leaves the stack as it was before the item.
                     del states[-1]
                     value = values.pop()
-                    values[-1].append(value)
+                    values[-1].append(value)  # type: ignore[attr-defined]  # the list
                     state = states[-1]
                     continue
                 if shape == _SINGLE:
@@ -120,7 +122,7 @@ class Engine:
                 state = goto[states[-1]][origin]
                 states.append(state)
                 if state == end and kind == END:
-                    return values[-1]
+                    return cast("_T", values[-1])
             states.append(action)
             if len(states) > max_stack:
                 raise TooDeep

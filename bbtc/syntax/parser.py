@@ -11,7 +11,7 @@ from bbtc.syntax import ast, scan
 from bbtc.syntax.build import Builder
 from bbtc.syntax.engine import Engine, TooDeep, Unexpected
 from bbtc.syntax.leaves import Misuse
-from bbtc.syntax.recover import recovered
+from bbtc.syntax.recover import Parser, recovered
 from bbtc.syntax.tables import tables
 
 MAX_DEPTH = 100
@@ -19,7 +19,7 @@ MAX_DEPTH = 100
 
 
 @lru_cache(maxsize=1)
-def _engine() -> Engine:
+def _engine() -> Parser:
     return Engine(tables(), Builder())
 
 
@@ -48,7 +48,7 @@ def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast
 def _definitions(text: str, source: SourceFile, report: Report, max_depth: int) -> tuple[ast.Definition, ...]:
     try:
         # Every form that is open has a state on the stack: in a shallow stack nothing is too deep.
-        return _engine().parse(text, source, max_depth)  # type: ignore[no-any-return]
+        return _engine().parse(text, source, max_depth)
     except (TooDeep, Unexpected, Misuse):
         deep = scan.too_deep(text, max_depth)
     if deep is not None:
@@ -57,6 +57,6 @@ def _definitions(text: str, source: SourceFile, report: Report, max_depth: int) 
         )
         return ()
     try:
-        return _engine().parse(text, source)  # type: ignore[no-any-return]
+        return _engine().parse(text, source)
     except (Unexpected, Misuse):
         return recovered(text, source, report, _engine())

@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 import re
+from typing import TypeAlias
 
 from bbtc.diagnostics import Diagnostic, Related, Report, Severity
 from bbtc.source import SourceFile
@@ -19,6 +20,7 @@ from bbtc.syntax.hints import Form, Place, explain, keywords, open_forms
 from bbtc.syntax.leaves import Misuse
 from bbtc.syntax.scan import blank, foreign_characters
 
+Parser: TypeAlias = Engine[tuple[ast.Definition, ...]]
 MAX_ERRORS = 20
 """Syntax errors reported for one file."""
 # All parses after the first take no more than this many characters in all.
@@ -30,7 +32,7 @@ _WORDS = re.compile(r"\)|(?:[^\s()]+\s*)*")
 _FIELD = re.compile(r"[()]|(?<![^\s()]):[a-z-]+", re.IGNORECASE | re.ASCII)
 
 
-def recovered(text: str, source: SourceFile, report: Report, engine: Engine) -> tuple[ast.Definition, ...]:
+def recovered(text: str, source: SourceFile, report: Report, engine: Parser) -> tuple[ast.Definition, ...]:
     """What can be read of a text with errors (comments blanked); the errors go to the report."""
     recovery = _Recovery(text, source, engine)
     definitions = recovery.run()
@@ -46,7 +48,7 @@ def recovered(text: str, source: SourceFile, report: Report, engine: Engine) -> 
 class _Recovery:
     """The faults of a text, gathered step by step."""
 
-    def __init__(self, text: str, source: SourceFile, engine: Engine) -> None:
+    def __init__(self, text: str, source: SourceFile, engine: Parser) -> None:
         self._source, self._engine = source, engine
         self._keywords = keywords(engine.terminals)
         self._foreign, text = foreign_characters(text, source)
@@ -65,7 +67,7 @@ class _Recovery:
             text = edited.decode("ascii")
             work += len(text)
             try:
-                return self._engine.parse(text, self._source)  # type: ignore[no-any-return]
+                return self._engine.parse(text, self._source)
             except Unexpected as error:
                 place = Place(
                     source, text, error.position, self._engine.accepted(error.stack), self._keywords

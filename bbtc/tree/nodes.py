@@ -137,15 +137,19 @@ def _put_together(*nodes: _Entry | ConditionNode | ActionNode) -> Node:
     return done.pop()
 
 
-def tree_depth(root: Node) -> int:
-    """The number of levels of a tree. Iterative: any tree can be measured."""
-    deepest, stack = 0, [(root, 1)]
+def levels(root: Node) -> Iterator[tuple[Node, int]]:
+    """Every node with its level, from 1 on. Iterative: any tree can be measured."""
+    stack = [(root, 1)]
     while stack:
         node, level = stack.pop()
-        deepest = max(deepest, level)
+        yield node, level
         if isinstance(node, ControlNode):
             stack.extend((child, level + 1) for child in node.children)
-    return deepest
+
+
+def tree_depth(root: Node) -> int:
+    """The number of levels of a tree."""
+    return max(level for _, level in levels(root))
 
 
 def retries_of(node: Node) -> Iterator[tuple[ControlNode, int]]:

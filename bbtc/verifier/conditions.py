@@ -12,52 +12,37 @@ from typing_extensions import assert_never
 
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.kleene import Truth
-from bbtc.verifier.program import NO, YES, Compare, Expression, Literally, all_of, any_of, none_of
+from bbtc.verifier.program import Compare, Expression, Literally, all_of, any_of, none_of
 
 FALSE, UNKNOWN, TRUE = 0, 1, 2
 
 
 def where_true(condition: Condition, cell_of: Mapping[int, int]) -> Expression:
     """Where the condition is true. ``cell_of`` gives the cell of each variable."""
-    match condition:
-        case Is(variable, Truth.TRUE):
-            return Compare(cell_of[variable], "=", TRUE)
-        case Is(variable, Truth.FALSE):
-            return Compare(cell_of[variable], "=", FALSE)
-        case Is(variable, _):
-            return Compare(cell_of[variable], "=", UNKNOWN)
-        case Known(variable):
-            return none_of(Compare(cell_of[variable], "=", UNKNOWN))
-        case And(parts):
-            return all_of(*(where_true(part, cell_of) for part in parts))
-        case Or(parts):
-            return any_of(*(where_true(part, cell_of) for part in parts))
-        case Not(part):
-            return where_false(part, cell_of)
-        case Constant(value):
-            return Literally(value)
-        case _:
-            assert_never(condition)
+    return _where(condition, cell_of, True)
 
 
 def where_false(condition: Condition, cell_of: Mapping[int, int]) -> Expression:
     """Where the condition is false."""
+    return _where(condition, cell_of, False)
+
+
+def _where(condition: Condition, cell_of: Mapping[int, int], value: bool) -> Expression:
     match condition:
-        case Is(variable, Truth.TRUE):
-            return Compare(cell_of[variable], "=", FALSE)
-        case Is(variable, Truth.FALSE):
-            return Compare(cell_of[variable], "=", TRUE)
-        case Is(variable, _):  # a test for unknown is itself never unknown
-            return none_of(Compare(cell_of[variable], "=", UNKNOWN))
+        case Is(variable, Truth.UNKNOWN):  # a test for unknown is itself never unknown
+            unknown = Compare(cell_of[variable], "=", UNKNOWN)
+            return unknown if value else none_of(unknown)
         case Known(variable):
-            return Compare(cell_of[variable], "=", UNKNOWN)
-        case And(parts):
-            return any_of(*(where_false(part, cell_of) for part in parts))
-        case Or(parts):
-            return all_of(*(where_false(part, cell_of) for part in parts))
+            unknown = Compare(cell_of[variable], "=", UNKNOWN)
+            return none_of(unknown) if value else unknown
+        case Is(variable, wanted):
+            return Compare(cell_of[variable], "=", TRUE if (wanted is Truth.TRUE) == value else FALSE)
+        case And(parts) | Or(parts):
+            each = (_where(part, cell_of, value) for part in parts)
+            return all_of(*each) if isinstance(condition, And) == value else any_of(*each)
         case Not(part):
-            return where_true(part, cell_of)
-        case Constant(value):
-            return NO if value else YES
+            return _where(part, cell_of, not value)
+        case Constant(constant):
+            return Literally(constant == value)
         case _:
             assert_never(condition)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from fractions import Fraction
+from functools import cache
 
 import pytest
 
@@ -77,6 +78,7 @@ _OBJECT = """
 """
 
 
+@cache  # the same text with the plain word stands beside each keyword
 def _figures(text: str) -> tuple[Fraction, Fraction | None, Fraction]:
     """The best probability, the least cost, and what a tree reaches."""
     task = compile_sources([SourceFile("words.pddl", text)], Report(), Limits())

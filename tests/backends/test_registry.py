@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +84,6 @@ def test_a_plugin_is_a_format_like_any_other(
     monkeypatch: pytest.MonkeyPatch, install: Callable[..., None]
 ) -> None:
     install(plain=f"{__name__}:plain")
-    monkeypatch.setattr(EntryPoint, "load", lambda self: plain)
     assert format_names()[-1] == "plain"
     assert load_exporter("plain") is plain
 
@@ -111,7 +109,6 @@ def test_a_plugin_that_is_no_exporter_is_an_error(
     monkeypatch: pytest.MonkeyPatch, install: Callable[..., None]
 ) -> None:
     install(mine=f"{__name__}:not_an_exporter")
-    monkeypatch.setattr(EntryPoint, "load", lambda self: not_an_exporter)
     with pytest.raises(BbtcError) as error:
         load_exporter("mine")
     assert code_of(error) == "BBT0703"
@@ -131,6 +128,9 @@ class Failing:
         return self.artefact
 
 
+failing = Failing(None)
+
+
 @pytest.mark.parametrize(
     "artefact",
     [ZeroDivisionError("division by zero"), KeyError("x"), RecursionError(), OSError(28, "No space"), None, 7,
@@ -141,14 +141,14 @@ class Failing:
 def test_a_plugin_that_fails_is_told_as_its_own_fault(
     monkeypatch: pytest.MonkeyPatch, install: Callable[..., None], artefact: object
 ) -> None:
-    install(failing="strange.package:exporter")
-    monkeypatch.setattr(EntryPoint, "load", lambda self: Failing(artefact))
+    install(failing=f"{__name__}:failing")
+    monkeypatch.setattr(failing, "artefact", artefact)
     domain, problem = (DOMAINS / "household" / f"{name}.pddl" for name in ("domain", "look-for-soda"))
     tree = bbtc.plan(domain, problem, target="0.5").tree
     with pytest.raises(BbtcError) as error:
         bbtc.export(tree, "failing")
     assert code_of(error) == "BBT0703"
-    assert "the exporter failing (strange.package:exporter" in str(error.value)
+    assert f"the exporter failing ({__name__}:failing" in str(error.value)
     assert "not of bbtc" in str(error.value)
 
 

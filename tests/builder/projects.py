@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import subprocess
-import sys
-from collections.abc import Mapping
 from pathlib import Path
 
 TEMPLATE = Path(__file__).parents[2] / "bbtc" / "builder" / "template"
@@ -21,19 +18,11 @@ COIN = """(define (domain coin)
 """A domain in which a tree of one refinement succeeds with probability 1/2, of two with 3/4."""
 
 
-def bbtc(
-    folder: Path, *arguments: str, env: Mapping[str, str] | None = None, timeout: float = 120
-) -> subprocess.CompletedProcess[str]:
+def bbtc(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the command in a folder."""
-    return subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", *arguments],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=timeout,
-        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "NO_COLOR": "1", **(env or {})},
-    )
+    from tests.cli import program
+
+    return program.bbtc(*arguments, folder=folder)
 
 
 def project(folder: Path, manifest: str, **sources: str) -> Path:

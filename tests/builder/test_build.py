@@ -12,11 +12,13 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import bbtc as bbtc_api
 from bbtc import pipeline
 from bbtc.builder import pool, runner, state
 from bbtc.builder.job import Job
@@ -65,6 +67,43 @@ def test_a_build_makes_what_the_commands_make(tmp_path: Path) -> None:
         "build/coin-big.dot": ["dot", "-O", "legend=true"],
     }.items():
         assert (folder / file).read_text() == bbtc(folder, "export", "tree.json", "--to", *form).stdout, file
+
+
+DOOR = """(define (domain door) (:predicates (inside) (shut) (key))
+  (:action open :precondition (key) :effect (not (shut)))
+  (:action force :effect (probabilistic 1/2 (not (shut))))
+  (:action drop :effect (not (key)))
+  (:action enter :precondition (not (shut)) :effect (inside)))
+(define (problem in) (:domain door) (:init (shut) (key)) (:goal (inside)))
+"""
+
+
+def test_a_build_holds_a_tree_to_what_it_does_where_others_change_the_world(tmp_path: Path) -> None:
+    # The tree opens the door and enters. Without the key, which only an action that it does not use takes,
+    # it tries to open the door for ever, although that can be forced: in one state of six.
+    def manifest(expect: str) -> str:
+        how = f"retries: unbounded, perturb: 0.1, expect: [{expect}]"
+        return f"trees:\n  door: {{domain: door.pddl, {how}}}\n"
+
+    folder = project(tmp_path, manifest("nodes < 99"), door_pddl=DOOR)
+    assert built(run(folder)) == ["door"]
+    tree = bbtc_api.load_tree(folder / "build/door.tree.json")
+    assert len(tree.task.actions) < 4
+    task = bbtc_api.compile(folder / "door.pddl")
+    expected = bbtc_api.recovery(tree, task=task)
+    assert (expected.states, expected.mean) == (6, Fraction(5, 6))
+    assert bbtc_api.recovery(tree).states < 6
+    runs = bbtc_api.perturb(tree, "0.1", task=task)
+    told = f"recovery == 5/6, perturbed-success == {runs.success}, perturbed-unready == {runs.unready}"
+    (folder / "bbtc.yaml").write_text(manifest(told))
+    assert built(run(folder)) == ["door"]
+    assert outcomes(run(folder)) == {"door": "unchanged"}
+    (folder / "bbtc.yaml").write_text(manifest(told).replace("0.1", "0.2"))
+    assert outcomes(run(folder)) == {"door": "failed"}
+    (folder / "bbtc.yaml").write_text(manifest("recovery > 1"))
+    done = bbtc(folder, "build")
+    assert done.returncode == 1
+    assert "door: expected recovery > 1, but recovery is " in done.stderr
 
 
 def test_a_format_of_several_files_goes_into_a_folder(

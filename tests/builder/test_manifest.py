@@ -155,6 +155,13 @@ FAULTS = {
     "option": (BASE + "    exports: {dot: {options: {size: 1}}}\n", "BBT0704", "4:21", "no option 'size'"),
     "expectation": (BASE + "    expect: [success is 1]\n", "BBT0604", "4:14", "FIGURE COMPARISON"),
     "figure": (BASE + "    expect: [luck >= 1]\n", "BBT0604", "4:14", "unknown figure"),
+    "no rate": (
+        BASE + "    expect: [perturbed-success > 0]\n",
+        "BBT0603",
+        "2:3",
+        "field 'perturb' is missing",
+    ),
+    "rate": (BASE + "    perturb: 2\n", "BBT0604", "4:14", "between 0 and 1"),
     "outside": (BASE + "    tree: ../x.json\n", "BBT0604", "4:11", "inside the project"),
     "absolute": (BASE + "    exports: {dot: /etc/passwd}\n", "BBT0604", "4:20", "inside the project"),
     "name": ("trees:\n  ../a:\n    domain: d\n", "BBT0604", "2:3", "cannot name a tree"),
@@ -317,6 +324,13 @@ def test_the_schema_refuses_what_we_refuse(name: str) -> None:
 def test_the_schema_knows_every_figure_and_setting() -> None:
     pattern = SCHEMA["$defs"]["expectation"]["pattern"]
     assert all(f"|{figure}|" in pattern.replace("(", "|").replace(")", "|") for figure in FIGURES)
+
+
+def test_the_schema_takes_the_rate_of_a_perturbed_world_and_what_is_expected_in_it() -> None:
+    text = BASE + "    perturb: 5%\n    expect: [perturbed-success >= 0.9, recovery == 1]\n"
+    assert not list(Draft202012Validator(SCHEMA).iter_errors(instance(text)))
+    assert read(text).trees[0].perturb == Fraction(1, 20)
+    assert list(Draft202012Validator(SCHEMA).iter_errors(instance(BASE + "    perturb: 5\n")))
 
 
 def test_the_schema_knows_every_strategy() -> None:

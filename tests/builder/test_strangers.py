@@ -297,7 +297,7 @@ def test_what_would_keep_a_reader_waiting_is_refused(tmp_path: Path, what: str) 
     else:
         (folder / ".bbtc").mkdir()
         os.mkfifo(folder / ".bbtc/state.json")
-    done = bbtc(folder, *arguments, timeout=60)
+    done = bbtc(folder, *arguments)
     assert done.returncode == 1
     assert ("it is a device" if "device" in what else "it is a named pipe") in done.stderr
 
@@ -305,5 +305,5 @@ def test_what_would_keep_a_reader_waiting_is_refused(tmp_path: Path, what: str) 
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
 def test_a_pipe_named_pyproject_is_no_manifest(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pyproject.toml")
-    done = bbtc(tmp_path, "build", timeout=60)
+    done = bbtc(tmp_path, "build")
     assert (done.returncode, "BBT1002" in done.stderr) == (1, True)

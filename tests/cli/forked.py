@@ -1,4 +1,9 @@
-"""Runs the program many times at little cost: in children of a process that has loaded everything."""
+"""Runs the program many times at little cost: in children of a process that has loaded everything.
+
+That process listens at a socket. Who wants a command run sends it the folder, the words, the environment and
+the three streams, and hears of the end. A test does so by :meth:`Commands.run`; scripts, Make and the like by
+a program ``bbtc`` that :meth:`Commands.install` writes for them.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +15,7 @@ import os
 import resource
 import selectors
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -17,9 +23,11 @@ import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 REPOSITORY = Path(__file__).parents[2]
 LONGEST = 300  # seconds of a run; then it counts as hanging
+_MOST = 1 << 20  # bytes of a request
 _WORDS = "coin.pddl -q --target 0.75 -o tree.json"
 _WARM_UP = (
     f"plan {_WORDS} --depfile tree.d",
@@ -63,8 +71,8 @@ class Done:
 class Commands:
     """The process."""
 
-    def __init__(self, process: subprocess.Popen[str]) -> None:
-        self._process = process
+    def __init__(self, address: str) -> None:
+        self._address = address
 
     def run(
         self,
@@ -78,59 +86,56 @@ class Commands:
         """Run the program in a folder; ``most_bytes``: no file can be larger, as if the disk were full;
         ``most_memory``: so many bytes of address space; ``powerless``: without what lets root write
         everywhere."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        wanted = [str(folder), arguments, stdin.decode("latin-1"), most_bytes, most_memory, powerless]
-        self._process.stdin.write(json.dumps(wanted) + "\n")
-        self._process.stdin.flush()
-        status, seconds, out, err = json.loads(self._process.stdout.readline())
-        return Done(status, out.encode("latin-1"), err.encode("latin-1"), seconds)
+        environment = {**os.environ, "PYTHONPATH": str(REPOSITORY), "NO_COLOR": "1"}
+        wanted = [str(folder), arguments, environment, most_bytes, most_memory, powerless]
+        with socket.socket(socket.AF_UNIX) as connection, tempfile.TemporaryFile() as given:
+            connection.connect(self._address)
+            given.write(stdin)
+            given.seek(0)
+            (out, into_out), (err, into_err) = os.pipe(), os.pipe()
+            socket.send_fds(connection, [b"."], [given.fileno(), into_out, into_err])
+            os.close(into_out)
+            os.close(into_err)
+            connection.sendall(json.dumps(wanted).encode())
+            connection.shutdown(socket.SHUT_WR)
+            stdout, stderr = _read([out, err])
+            status, seconds = json.loads(connection.makefile("rb").read())
+        return Done(status, stdout, stderr, seconds)
+
+    def install(self, file: Path, before: str = "") -> None:
+        """Write a program that does what ``bbtc`` does; ``before`` is for a shell to run first."""
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(
+            f"#!/bin/sh\n{before}\n"
+            f'exec "{sys.executable}" -I -S "{Path(__file__).with_name("ask.py")}" "{self._address}" "$@"\n'
+        )
+        file.chmod(0o755)
 
 
 @cache
 def commands() -> Commands:
     """The process, which ends with this one."""
+    folder = tempfile.TemporaryDirectory()
+    address = str(Path(folder.name, "socket"))
     process = subprocess.Popen(
-        [sys.executable, __file__],
+        [sys.executable, __file__, address],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        text=True,
         env={**os.environ, "PYTHONPATH": str(REPOSITORY), "NO_COLOR": "1"},
     )
-    atexit.register(process.communicate)
-    return Commands(process)
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"ready\n"
+
+    def end() -> None:
+        process.communicate()
+        folder.cleanup()
+
+    atexit.register(end)
+    return Commands(address)
 
 
-# --- in the process --------------------------------------------------------------------------
-
-
-def _main() -> None:
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    _warm_up()
-    for line in sys.stdin:
-        folder, arguments, stdin, *bounds = json.loads(line)
-        with tempfile.TemporaryFile() as given:
-            given.write(stdin.encode("latin-1"))
-            given.seek(0)
-            pipes = [os.pipe(), os.pipe()]
-            child = os.fork()
-            if not child:
-                os.dup2(given.fileno(), 0)
-                for number, (_, into) in enumerate(pipes, 1):
-                    os.dup2(into, number)
-                _child(folder, arguments, *bounds)
-        for _, into in pipes:
-            os.close(into)
-        told = _read([out_of for out_of, _ in pipes])
-        _, status, used = os.wait4(child, 0)
-        seconds = used.ru_utime + used.ru_stime
-        answers.write(json.dumps([os.waitstatus_to_exitcode(status), seconds, *told]) + "\n")
-        answers.flush()
-
-
-def _read(pipes: list[int]) -> list[str]:
-    """What is written to pipes until their ends, a character for each byte."""
+def _read(pipes: list[int]) -> list[bytes]:
+    """What is written to pipes until their ends."""
     told = {pipe: bytearray() for pipe in pipes}
     with selectors.DefaultSelector() as waiting:
         for pipe in pipes:
@@ -142,7 +147,63 @@ def _read(pipes: list[int]) -> list[str]:
                 if not piece:
                     waiting.unregister(key.fd)
                     os.close(key.fd)
-    return [data.decode("latin-1") for data in told.values()]
+    return [bytes(data) for data in told.values()]
+
+
+# --- in the process --------------------------------------------------------------------------
+
+
+def _main() -> None:
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(sys.argv[1])
+        listener.listen(16)
+        ready = os.dup(1)
+        os.dup2(2, 1)
+        _warm_up()
+        os.write(ready, b"ready\n")
+        os.close(ready)
+        with selectors.DefaultSelector() as waiting:
+            waiting.register(0, selectors.EVENT_READ)
+            waiting.register(listener, selectors.EVENT_READ)
+            while True:
+                ready_ones = [key.fileobj for key, _ in waiting.select(1)]
+                if 0 in ready_ones:
+                    return  # who started this process has ended
+                if ready_ones:
+                    _serve(listener)
+                _bury()
+
+
+def _serve(listener: socket.socket) -> None:
+    connection, _ = listener.accept()
+    with connection:
+        if not os.fork():
+            # Several may be running at once: each has a process that waits for its end.
+            listener.close()
+            _, streams, _, _ = socket.recv_fds(connection, 1, 3)
+            request: Any = json.loads(connection.makefile("rb").read(_MOST))
+            child = os.fork()
+            if not child:
+                connection.close()
+                for number, stream in enumerate(streams):
+                    os.dup2(stream, number)
+                    os.close(stream)
+                _child(*request)
+            for stream in (0, 1, 2, *streams):
+                os.close(stream)
+            _, status, used = os.wait4(child, 0)
+            seconds = used.ru_utime + used.ru_stime
+            connection.sendall(json.dumps([os.waitstatus_to_exitcode(status), seconds]).encode())
+            os._exit(0)
+
+
+def _bury() -> None:
+    """Take note of the ends of those that have waited."""
+    try:
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+    except ChildProcessError:
+        pass
 
 
 def _warm_up() -> None:
@@ -169,9 +230,16 @@ def _run(arguments: list[str]) -> int:
 
 
 def _child(
-    folder: str, arguments: list[str], most_bytes: int | None, most_memory: int | None, powerless: bool
+    folder: str,
+    arguments: list[str],
+    environment: dict[str, str],
+    most_bytes: int | None,
+    most_memory: int | None,
+    powerless: bool,
 ) -> None:
     signal.alarm(LONGEST)
+    os.environ.clear()
+    os.environ.update(environment)
     sys.stdin = io.TextIOWrapper(os.fdopen(0, "rb", closefd=False))
     sys.stdout = io.TextIOWrapper(os.fdopen(1, "wb", closefd=False))
     sys.stderr = io.TextIOWrapper(os.fdopen(2, "wb", closefd=False), line_buffering=True)

@@ -149,3 +149,30 @@ def test_any_name_of_a_file_makes_valid_sarif(name: str) -> None:
     assert re.fullmatch(r"(file://)?[\w/.%~-]+", uri, re.ASCII)
     region = results[0]["locations"][0]["physicalLocation"]["region"]
     assert region == {"startLine": 2, "startColumn": 1, "endLine": 2, "endColumn": 9}
+
+
+def test_sarif_names_the_published_page_of_a_code_where_the_package_names_a_site(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = [Diagnostic("BBT0101", "wrong"), Diagnostic("BBT0301", "unused", severity=Severity.WARNING)]
+
+    def addresses() -> list[str | None]:
+        text = render(found, "sarif")
+        assert_sarif(text)
+        return [rule.get("helpUri") for rule in json.loads(text)["runs"][0]["tool"]["driver"]["rules"]]
+
+    def installed(folder: str, *headers: str) -> None:
+        info = tmp_path / folder / "bbtc-1.dist-info"
+        info.mkdir(parents=True)
+        lines = ["Metadata-Version: 2.1", "Name: bbtc", "Version: 1", *headers, ""]
+        (info / "METADATA").write_text("\n".join(lines), encoding="utf-8")
+        monkeypatch.syspath_prepend(info.parent)
+
+    installed("no-site", "Project-URL: Source, https://example.org/source")
+    assert addresses() == [None, None]
+    for folder, site in (("site", "https://example.org/bbtc"), ("with-slash", "https://example.org/bbtc/")):
+        installed(folder, f"Project-URL: Documentation, {site}")
+        assert addresses() == [f"https://example.org/bbtc/errors/{each.code}.html" for each in found]
+    # So MkDocs lays pages out.
+    assert "use_directory_urls: false" in (REPOSITORY / "mkdocs.yml").read_text(encoding="utf-8").splitlines()
+    assert all((REPOSITORY / "docs" / "errors" / f"{each.code}.md").is_file() for each in found)

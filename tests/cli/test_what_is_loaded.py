@@ -1,4 +1,5 @@
-"""Commands that only read text load neither the planner nor what follows it: editors run them often."""
+"""A command loads what it needs and no more: editors and build systems run them often, and on small inputs
+loading takes most of the time."""
 
 from __future__ import annotations
 
@@ -7,6 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
+
+from tests.cli.program import bbtc
 
 _DOMAIN = """(define (domain lamps)
   (:predicates (lit) (powered))
@@ -53,6 +56,67 @@ def test_check_and_fmt_load_no_planner_and_no_verifier(folder: Path, command: st
     assert status == "0"
     assert {"bbtc.pipeline", "bbtc.syntax.parser"} <= modules
     assert sorted(each for each in modules if each.startswith(tuple(f"bbtc.{name}" for name in _LATER))) == []
+
+
+_TREE = "plan -q domain.pddl problem.pddl -o tree.json"
+_TEXT = ("syntax.ast", "syntax.parser", "analysis", "model")
+_COSTLY = ("numpy", "lark", "yaml", "hmac")
+
+
+@pytest.mark.parametrize(
+    ("command", "later", "others"),
+    [
+        ("check domain.pddl problem.pddl", (*_LATER, "artefacts"), _COSTLY),
+        ("fmt --check domain.pddl", (*_LATER, "artefacts", "analysis"), (*_COSTLY, "clingo")),
+        (
+            "compile domain.pddl problem.pddl -o task.json",
+            ("planner", "verifier", "rewrite", "belief"),
+            _COSTLY,
+        ),
+        (_TREE, ("verifier", "replay", "builder", "cli.commands.verify"), ("lark", "yaml", "hmac")),
+        (f"{_TREE} --strategy strong-cyclic", ("verifier", "planner.chaining", "planner.synthesis"), _COSTLY),
+        (
+            f"{_TREE} --strategy refine",
+            ("verifier", "planner.synthesis", "planner.strong_cyclic"),
+            ("lark", "hmac"),
+        ),
+        ("simulate tree.json", (*_TEXT, "verifier", "planner.mdp", "planner.why_not"), (*_COSTLY, "clingo")),
+        ("verify tree.json --engine own", (*_TEXT, "planner", "rewrite"), (*_COSTLY, "clingo")),
+        ("export tree.json --to dot -o tree.dot", (*_TEXT, "verifier", "planner.mdp"), (*_COSTLY, "clingo")),
+        (
+            "export tree.json --to btcpp -o tree.xml",
+            (*_TEXT, "verifier", "planner.mdp"),
+            (*_COSTLY, "clingo"),
+        ),
+        ("run --batch tree.json", (*_TEXT, "verifier", "planner"), (*_COSTLY, "clingo")),
+        ("diff tree.json tree.json", (*_TEXT, "verifier", "planner"), (*_COSTLY, "clingo")),
+    ],
+)
+def test_a_command_loads_no_more_than_it_needs(
+    folder: Path, command: str, later: tuple[str, ...], others: tuple[str, ...]
+) -> None:
+    if "tree.json" in command and not command.startswith(_TREE):
+        assert bbtc(*_TREE.split(), folder=folder).returncode == 0
+    _, modules = loaded(folder, *command.split())
+    assert "bbtc.cli.output" in modules
+    unneeded = (*(f"bbtc.{name}" for name in later), *others)
+    assert sorted(each for each in modules if _is_in(each, unneeded)) == []
+
+
+def _is_in(module: str, packages: tuple[str, ...]) -> bool:
+    return any(module == package or module.startswith(f"{package}.") for package in packages)
+
+
+def test_figures_of_a_tree_that_fails_load_what_explains_it(folder: Path) -> None:
+    (folder / "match.pddl").write_text(
+        "(define (domain d) (:predicates (new) (lit)) (:action strike :precondition (new)"
+        " :effect (and (not (new)) (probabilistic 1/2 (lit)))))"
+        "(define (problem q) (:domain d) (:init (new)) (:goal (lit)))"
+    )
+    plan = bbtc("plan", "match.pddl", "--target", "0.5", "-o", "tree.json", folder=folder)
+    assert plan.returncode == 0
+    _, modules = loaded(folder, "simulate", "tree.json")
+    assert {"bbtc.planner.why_not", "numpy"} <= modules
 
 
 def test_planning_is_seen_to_load_the_planner(folder: Path) -> None:

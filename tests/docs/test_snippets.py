@@ -16,6 +16,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.forked import commands
+
 REPOSITORY = Path(__file__).parents[2]
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -52,9 +54,7 @@ def test_the_snippets_of_a_page_print_what_it_says(page: Path, tmp_path: Path) -
     for shown in ("docs", "domains"):
         (tmp_path / shown).symlink_to(REPOSITORY / shown)
     shim = tmp_path / ".bin" / "bbtc"
-    shim.parent.mkdir()
-    shim.write_text(f'#!/bin/sh\nexec {sys.executable} -m bbtc.cli.main "$@"\n')
-    shim.chmod(0o755)
+    commands().install(shim)
     python = shim.parent / "python"
     python.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
     python.chmod(0o755)

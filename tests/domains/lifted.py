@@ -204,6 +204,25 @@ class Lifted:
             case _:
                 return [(Fraction(1), {_fact(form, bound): 2}, Fraction(0))]
 
+    def met(self, form: Form, bound: Mapping[str, str], world: World) -> Iterator[bool]:
+        """Whether the conditions in an effect are met, all that :meth:`effect` reads of the world."""
+        parts: Iterable[Form] = ()
+        match form:
+            case ["and" | "oneof", *parts]:
+                pass
+            case ["probabilistic", *branches]:
+                parts = branches[1::2]
+            case ["forall", parameters, part]:
+                for each in self.bindings(typed(parameters), bound):
+                    yield from self.met(part, each, world)
+            case ["when", condition, part]:
+                yield (known := self.value(condition, bound, world) == 2)
+                parts = [part] if known else []
+            case _:
+                pass
+        for part in parts:
+            yield from self.met(part, bound, world)
+
     def number(self, form: Form, bound: Mapping[str, str]) -> Fraction:
         """A number, or what ``:init`` gives as the value of a function."""
         if isinstance(form, str):
@@ -301,9 +320,11 @@ class Lifted:
     def after(self, move: Move, state: State) -> Result:
         """What an action costs on average, and what it leads to; remembered."""
         if state not in move.results:
-            draws = move.draws or self.effect(move.effect, move.bound, self.world(state))
-            if "'when'" not in str(move.effect):
-                move.draws = draws
+            world = self.world(state)
+            met = tuple(self.met(move.effect, move.bound, world))
+            if met not in move.draws:
+                move.draws[met] = self.effect(move.effect, move.bound, world)
+            draws = move.draws[met]
             cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
             facts = dict(state)
             move.results[state] = cost, _states((p, {**facts, **change}) for p, change, _ in draws)
@@ -342,12 +363,12 @@ class Lifted:
 
 @dataclass
 class Move:
-    """An action with arguments; its draws, if they are the same in every world."""
+    """An action with arguments; its draws, by which of its conditions are met."""
 
     needs: Form
     effect: Form
     bound: Binding
-    draws: Draws | None = None
+    draws: dict[tuple[bool, ...], Draws] = field(default_factory=dict)
     results: dict[State, Result] = field(default_factory=dict)
 
 

@@ -109,3 +109,15 @@ def test_a_called_template_is_kept_though_its_own_guide_can_never_apply() -> Non
     )
     task = task_of(text + _PROBLEM.format(init="(stairs hall)", goal="(seen soda)"))
     assert task.template_by_name["find-in(soda,attic)"].precondition == FALSE
+
+
+def test_what_guards_an_effect_on_the_goal_is_kept_beside_templates() -> None:
+    task = task_of(
+        """(define (domain d) (:predicates (p) (q) (r))
+        (:action make :parameters () :effect (when (q) (p)))
+        (:action turn :parameters () :effect (and (q) (r)))
+        (:template go :parameters () :effect (p) :body (action make)))
+        (define (problem x) (:domain d) (:init) (:goal (p)))"""
+    )
+    assert [variable.name for variable in task.variables] == ["p()", "q()"]
+    assert list(task.action_by_name) == ["make()", "turn()"]

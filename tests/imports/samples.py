@@ -17,7 +17,7 @@ from bbtc.kleene import Truth
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from tests.replay.reference import expected_ticks
-from tests.replay.ticks import TickWorld, random_script
+from tests.replay.ticks import TickWorld, random_script, trace
 
 PROFILES = ("stock", "bbtc")
 
@@ -157,7 +157,7 @@ def check_in_engine(tree: Tree, text: str, rng: random.Random, scripts: int = 3)
     replay.begin(TickWorld(tree.task, random_script(tree.task, rng, 1)))
     for _ in range(scripts):
         script = random_script(tree.task, rng, 12)
-        assert replay.trace(script) == expected_ticks(tree.task, imported.tree.root, script), text
+        assert trace(replay, script) == expected_ticks(tree.task, imported.tree.root, script), text
 
 
 def lines_of(found: list[Diagnostic]) -> list[tuple[int, str]]:

@@ -20,7 +20,7 @@ from tests.imports.engine_nodes import NODES, SCRIPTS
 from tests.long_form import amount
 from tests.replay.random_trees import busy_tree, random_tree
 from tests.replay.reference import expected_ticks
-from tests.replay.ticks import TickWorld, random_script
+from tests.replay.ticks import TickWorld, random_script, trace
 
 MUTANTS = amount(600, 20_000)
 RUN = amount(800, 40_000)
@@ -146,7 +146,7 @@ def test_what_is_read_of_a_changed_file_is_what_the_engine_does() -> None:
             continue
         for _ in range(4):
             script = random_script(tree.task, rng, 15)
-            assert replay.trace(script) == expected_ticks(tree.task, found.root, script), (number, text)
+            assert trace(replay, script) == expected_ticks(tree.task, found.root, script), (number, text)
         compared += 1
         different += _shape(found) != _shape(tree)
     assert not_loaded < RUN / 20

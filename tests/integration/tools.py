@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cli.forked import commands
+
 REPOSITORY = Path(__file__).parents[2]
 
 
@@ -35,12 +37,7 @@ def tool(name: str) -> str:
 def program(folder: Path) -> Path:
     """A program ``bbtc`` in a folder, which runs this repository's and notes each run in ``runs.txt``."""
     script = folder / "bin" / "bbtc"
-    script.parent.mkdir(parents=True, exist_ok=True)
-    script.write_text(
-        f'#!/bin/sh\necho "$1" >> "{folder}/runs.txt"\n'
-        f'PYTHONPATH="{REPOSITORY}" exec {sys.executable} -m bbtc.cli.main "$@"\n'
-    )
-    script.chmod(0o755)
+    commands().install(script, f'echo "$1" >> "{folder}/runs.txt"')
     return script
 
 

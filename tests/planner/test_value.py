@@ -12,7 +12,7 @@ from hypothesis import assume, given
 
 from bbtc.belief.state import Values
 from bbtc.diagnostics import BbtcError, LimitReached
-from bbtc.ground.condition import Is
+from bbtc.ground.condition import And, Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -21,6 +21,7 @@ from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
+from bbtc.planner.mdp.policy_iteration import Equations
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.mdp.state_space import StateSpace
 from tests.planner.examples import Optimum, cases, corpus_optima
@@ -239,6 +240,22 @@ def test_a_loop_that_can_be_left_only_with_a_loss_is_not_worth_more_than_its_exi
     risk = action("risk", Is(2, F), ("1/3", {1: T, 2: T}), ("2/3", {2: T}))
     of = task("room won over", {}, Is(1, T), there, back, risk)
     assert solved(of).initial.exact == Fraction(1, 3)
+
+
+def test_policy_iteration_leaves_a_poor_policy_for_the_best() -> None:
+    """The shortest way wins half the time, a longer one nine times of ten; no guess in floats helps."""
+    dash = action("dash", Is(2, F), ("1/2", {1: T}), ("1/2", {2: T}))
+    prepare = action("prepare", Is(2, F), ("1", {0: T}))
+    walk = action("walk", And((Is(0, T), Is(2, F))), ("9/10", {1: T}), ("1/10", {2: T}))
+    found = solved(task("ready won over", {}, Is(1, T), dash, prepare, walk))
+    assert found.initial.exact == Fraction(9, 10)
+    part = ~found.prob_1 & ~found.prob_0
+    shortest = found.graph.reach(found.prob_1).via.copy()
+    start = found.space.initial[0][1]
+    assert shortest[start] != found.policy[start]
+    values = Equations(found.graph, part, found.prob_1).solve(shortest, Limits())
+    assert values == [Fraction(9, 10)] * int(part.sum())
+    assert shortest[start] == found.policy[start]
 
 
 def test_a_task_whose_goal_nothing_reaches_has_the_value_0_and_costs_nothing() -> None:

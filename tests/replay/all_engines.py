@@ -9,12 +9,12 @@ from typing import Literal, TypeAlias
 
 import pytest
 
-from bbtc.replay.engines import BtcppReplay, Engine, PyTreesReplay
+from bbtc.replay.engines import BtcppReplay, PyTreesReplay, Replay
 from bbtc.tree.nodes import Tree
-from tests.replay.oldest import oldest_py_trees
+from tests.replay.oldest import OldestReplay, oldest_py_trees
 
 Runtime: TypeAlias = Literal["embedded", "imported"]
-Make: TypeAlias = Callable[[Tree, Runtime], Engine]
+Make: TypeAlias = Callable[[Tree, Runtime], Replay | OldestReplay]
 """From a tree to the engine that runs it; the second argument is an option of the py_trees export."""
 
 EngineName: TypeAlias = Literal["py_trees", "py_trees 2.2", "BehaviorTree.CPP"]

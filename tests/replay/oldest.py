@@ -19,7 +19,7 @@ import pytest
 
 from bbtc.replay.script import Run, Script, Timing
 from bbtc.tree.nodes import Tree
-from tests.replay.ticks import Tick, TickScript
+from tests.replay.ticks import Tick, TickScript, trace
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 FOLDER = REPOSITORY / "build" / "py_trees-2.2"
@@ -115,7 +115,7 @@ def _answers() -> Iterator[object]:
                 yield None
             else:
                 assert replay is not None
-                yield replay.runs(content) if kind == "runs" else replay.trace(content)
+                yield replay.runs(content) if kind == "runs" else trace(replay, content)
         except Exception as error:  # noqa: BLE001
             yield error
 

@@ -12,7 +12,7 @@ from bbtc.kleene import Truth
 from bbtc.replay.engines import BtcppReplay, PyTreesReplay
 from bbtc.replay.script import TIMINGS, Run, Script, Timing
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
-from tests.replay.ticks import Tick, TickScript, TickWorld
+from tests.replay.ticks import Tick, TickScript, TickWorld, trace
 
 P, Q, R = (Is(index, Truth.TRUE) for index in range(3))
 TRUE_, FALSE_, UNKNOWN_ = 2, 0, 1
@@ -119,17 +119,17 @@ WANTED = control("fallback", check(P), control("sequence", ActionNode("a", "go()
 
 
 def test_an_action_is_called_until_it_ends_and_its_end_shows_in_the_next_tick(engine: Engine) -> None:
-    ticks = engine(tree_of(WANTED)).trace(script(N, N, N, N, runs=((3, True),)))
+    ticks = trace(engine(tree_of(WANTED)), script(N, N, N, N, runs=((3, True),)))
     assert shown(ticks) == ["+go() running", ".go() running", ".go() running", " failure"]
 
 
 def test_an_action_that_ends_in_the_tick_that_starts_it_is_running_in_it(engine: Engine) -> None:
-    ticks = engine(tree_of(WANTED)).trace(script(N, Y, runs=((1, True),)))
+    ticks = trace(engine(tree_of(WANTED)), script(N, Y, runs=((1, True),)))
     assert shown(ticks) == ["+go() running", " success"]
 
 
 def test_an_action_is_cancelled_in_the_tick_that_does_without_it(engine: Engine) -> None:
-    ticks = engine(tree_of(WANTED)).trace(script(N, N, Y, runs=((9, True),)))
+    ticks = trace(engine(tree_of(WANTED)), script(N, N, Y, runs=((9, True),)))
     assert shown(ticks) == ["+go() running", ".go() running", "-go() success"]
 
 
@@ -139,7 +139,7 @@ def test_an_action_is_cancelled_where_a_precondition_fails_and_does_not_start_ag
         control("sequence", check(P), ActionNode("a", "go()"), check(Q)),
         control("sequence", ActionNode("b", "do()"), check(Q)),
     )
-    ticks = engine(tree_of(root)).trace(script(Y, N, Y, Y, runs=((9, True), (2, True))))
+    ticks = trace(engine(tree_of(root)), script(Y, N, Y, Y, runs=((9, True), (2, True))))
     assert shown(ticks) == ["+go() running", "+do() -go() running", ".do() running", " failure"]
 
 
@@ -149,31 +149,31 @@ def test_the_same_action_starts_anew_for_a_node_to_the_left(engine: Engine) -> N
         control("sequence", check(P), ActionNode("a", "go()"), check(Q)),
         control("sequence", ActionNode("b", "go()"), check(Q)),
     )
-    ticks = engine(tree_of(root)).trace(script(N, Y, Y, runs=((9, True), (2, True))))
+    ticks = trace(engine(tree_of(root)), script(N, Y, Y, runs=((9, True), (2, True))))
     assert shown(ticks) == ["+go() running", "+go() -go() running", ".go() running"]
 
 
 def test_an_action_whose_condition_becomes_unknown_is_cancelled_and_nothing_goes_on(engine: Engine) -> None:
-    ticks = engine(tree_of(WANTED)).trace(script(N, U, runs=((9, True),)))
+    ticks = trace(engine(tree_of(WANTED)), script(N, U, runs=((9, True),)))
     assert shown(ticks) == ["+go() running", "-go() failure"]
 
 
 def test_a_failed_action_fails_once_it_has_ended_and_is_not_tried_again(engine: Engine) -> None:
     root = control("fallback", ActionNode("a", "go()"), ActionNode("b", "do()"))
-    ticks = engine(tree_of(root)).trace(script(N, N, N, N, runs=((2, False), (1, True))))
+    ticks = trace(engine(tree_of(root)), script(N, N, N, N, runs=((2, False), (1, True))))
     assert shown(ticks) == ["+go() running", ".go() running", "+do() running", " success"]
 
 
 def test_an_action_that_is_not_latched_starts_again_after_every_end(engine: Engine) -> None:
     root = control("fallback", check(P), ActionNode("a", "go()", latched=False))
-    ticks = engine(tree_of(root)).trace(script(N, N, N, N, Y, runs=((2, True), (1, False), (9, True))))
+    ticks = trace(engine(tree_of(root)), script(N, N, N, N, Y, runs=((2, True), (1, False), (9, True))))
     expected = ["+go() running", ".go() running", "+go() running", "+go() running", "-go() success"]
     assert shown(ticks) == expected
 
 
 def test_an_action_that_fails_at_once_is_tried_once_a_tick_also_without_end(engine: Engine) -> None:
     root = control("fallback", check(P), ActionNode("a", "go()", latched=False))
-    ticks = engine(tree_of(root)).trace(script(N, N, N, Y, runs=((1, False),) * 9))
+    ticks = trace(engine(tree_of(root)), script(N, N, N, Y, runs=((1, False),) * 9))
     assert shown(ticks) == ["+go() running", "+go() running", "+go() running", " success"]
 
 
@@ -181,13 +181,13 @@ def test_a_cancelled_attempt_counts_below_a_retry_node(engine: Engine) -> None:
     go = ActionNode("a", "go()", latched=False)
     tries = control("fallback", control("sequence", check(P), go), check(Q))
     root = control("fallback", ControlNode("r", "retry", (tries,), attempts=2), ActionNode("b", "do()"))
-    ticks = engine(tree_of(root)).trace(script(Y, N, Y, Y, runs=((9, True), (1, True), (1, True))))
+    ticks = trace(engine(tree_of(root)), script(Y, N, Y, Y, runs=((9, True), (1, True), (1, True))))
     assert shown(ticks) == ["+go() running", "+do() -go() running", "+go() running", " success"]
 
 
 def test_a_tree_that_is_halted_by_a_larger_one_cancels_what_runs_and_can_go_on(engine: Engine) -> None:
     root = control("sequence", ActionNode("a", "go()"), ActionNode("b", "do()"))
-    ticks = engine(tree_of(root)).trace(script(N, N, N, N, runs=((9, True), (2, True)), halts=1))
+    ticks = trace(engine(tree_of(root)), script(N, N, N, N, runs=((9, True), (2, True)), halts=1))
     assert shown(ticks) == ["+go() running", ".go() -go() running", "+do() running", ".do() running"]
 
 

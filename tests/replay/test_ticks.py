@@ -17,7 +17,7 @@ from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import Running, expected_ticks, value_of
-from tests.replay.ticks import TickWorld, random_script
+from tests.replay.ticks import TickWorld, random_script, trace
 
 TREES = amount(200, 2000)
 SCRIPTS = 5
@@ -39,7 +39,7 @@ def test_every_tick_is_as_in_the_reference(
             for _ in range(SCRIPTS):
                 script = random_script(tree.task, rng, TICKS)
                 expected = expected_ticks(tree.task, tree.root, script)
-                assert replay.trace(script) == expected, (seed, script, replay.source)
+                assert trace(replay, script) == expected, (seed, script, replay.source)
                 for kind in count:
                     count[kind] += sum(len(getattr(tick, kind)) for tick in expected)
                 compared.add(ticks=len(expected))
@@ -77,7 +77,7 @@ def test_plans_run_as_in_the_reference_whatever_changes(
             for _ in range(10):
                 script = random_script(tree.task, rng, TICKS)
                 expected = expected_ticks(tree.task, tree.root, script)
-                assert replay.trace(script) == expected, (problem, script)
+                assert trace(replay, script) == expected, (problem, script)
                 compared.add(ticks=len(expected))
             compared.add(trees=1)
 

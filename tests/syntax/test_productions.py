@@ -157,7 +157,7 @@ def test_a_fast_form_gives_the_same_nodes_as_the_slow_one(form: str) -> None:
     texts = [f"(define (domain d) {section})" for section in FAST_AND_SLOW[form]]
     built = [Recorder(), Recorder()]
     fast, slow = (
-        Engine(tables(), recorder).parse(text, SourceFile("test.pddl", text))
+        Engine[object](tables(), recorder).parse(text, SourceFile("test.pddl", text))
         for recorder, text in zip(built, texts, strict=True)
     )
     assert sorted(built[0].called) != sorted(built[1].called)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.names import BtcppNames
-from bbtc.backends.btcpp.palette import port_text, signature
+from bbtc.backends.btcpp.palette import port_code, signature
 from bbtc.backends.interface import Leaf
 from bbtc.ground.task import Task
 
@@ -281,10 +281,6 @@ class LeafWriter:
         return "\n".join([*lines, _STUB_END, *self._close()])
 
     def _class(self, leaf: Leaf) -> str:
-        ports = [
-            f"BT::InputPort<std::string>({cppcode.literal(port)}, {cppcode.literal(text)})"
-            for port, text in zip(leaf.parameters, port_text(self._task, self._names, leaf), strict=True)
-        ]
         told = f"/// {cppcode.comment(signature(leaf))}\n"
         return told + cppcode.fill(
             _ACTION if leaf.symbol.kind == "action" else _CONDITION,
@@ -292,7 +288,7 @@ class LeafWriter:
             METHOD=self.method(leaf),
             CANCEL=self.cancel(leaf),
             ARGUMENTS=", ".join(f"argument(*this, {cppcode.literal(port)})" for port in leaf.parameters),
-            PORTS=f"{{{', '.join(ports)}}}",
+            PORTS=port_code(self._task, self._names, leaf),
         )
 
     def _open(self, text: str) -> str:

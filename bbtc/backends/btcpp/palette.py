@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
+from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, Profile
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
@@ -69,12 +70,17 @@ def _entry(
     SubElement(element, "description").text = meaning(leaf)
 
 
-def port_text(task: Task, names: BtcppNames, leaf: Leaf) -> list[str]:
-    """What is said of each port of a leaf: some of the objects that may stand there."""
-    return _port_text(names, _objects(task), leaf)
+def port_code(task: Task, names: BtcppNames, leaf: Leaf) -> str:
+    """The ports of a leaf in C++, with what is said of each."""
+    ports = [
+        f"BT::InputPort<std::string>({cppcode.literal(port)}, {cppcode.literal(text)})"
+        for port, text in zip(leaf.parameters, _port_text(names, _objects(task), leaf), strict=True)
+    ]
+    return f"{{{', '.join(ports)}}}"
 
 
 def _port_text(names: BtcppNames, objects: _Objects, leaf: Leaf) -> list[str]:
+    """What is said of each port of a leaf: some of the objects that may stand there."""
     texts = []
     for position in range(leaf.symbol.arity):
         known = objects.get((leaf.symbol.kind, leaf.symbol.name, position), {})

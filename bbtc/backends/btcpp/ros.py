@@ -9,7 +9,7 @@ import re
 from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.leaves import ACCESS, Program
 from bbtc.backends.btcpp.names import BtcppNames
-from bbtc.backends.btcpp.palette import port_text, signature
+from bbtc.backends.btcpp.palette import port_code, signature
 from bbtc.backends.exporter import Begun
 from bbtc.backends.interface import Leaf
 from bbtc.backends.names import Symbol
@@ -101,7 +101,7 @@ class _RosWriter:
             _CONDITION,
             TOLD=cppcode.comment(signature(leaf)),
             NAME=f"{self._names.plain[leaf.symbol]}Condition",
-            PORTS=self._ports(leaf),
+            PORTS=port_code(self._task, self._names, leaf),
             FACT=cppcode.literal(self._names.ids[leaf.symbol]),
             ARGUMENTS=f"{{{', '.join(names)}}}",
             UNKNOWN="true" if leaf.three_valued else "false",
@@ -118,16 +118,9 @@ class _RosWriter:
             TOLD=cppcode.comment(signature(leaf)),
             NAME=f"{self._names.plain[leaf.symbol]}Action",
             TYPE=f"{self._program.package}::{self._folder}::{kind}",
-            PORTS=self._ports(leaf),
+            PORTS=port_code(self._task, self._names, leaf),
             FIELDS="\n".join(fields) if fields else f"    (void)request;  // {self.kind} without arguments",
         )
-
-    def _ports(self, leaf: Leaf) -> str:
-        ports = [
-            f"BT::InputPort<std::string>({cppcode.literal(port)}, {cppcode.literal(text)})"
-            for port, text in zip(leaf.parameters, port_text(self._task, self._names, leaf), strict=True)
-        ]
-        return f"{{{', '.join(ports)}}}"
 
     def _register(self) -> str:
         lines = [

@@ -15,6 +15,7 @@ from types import MappingProxyType
 
 from bbtc.backends.exporter import Option
 from bbtc.backends.pytrees.pycode import WIDTH
+from bbtc.markov import reachable
 
 RUNTIME = Option(
     "runtime",
@@ -58,15 +59,7 @@ def defined(names: Iterable[str]) -> set[str]:
 def needed(names: Iterable[str]) -> set[str]:
     """The names, and all names that their definitions refer to, directly or not."""
     definitions = _source().definitions
-    found: set[str] = set()
-    queue = sorted(names)
-    while queue:
-        name = queue.pop()
-        if name not in found:
-            found.add(name)
-            if name in definitions:
-                queue.extend(definitions[name].uses)
-    return found
+    return reachable(names, lambda name: definitions[name].uses if name in definitions else ())
 
 
 def copied(module: str, names: set[str]) -> list[list[str]]:

@@ -31,7 +31,8 @@ def command(
     depfile: str | None,
 ) -> None:
     """Parse, check and ground the PROBLEM of DOMAIN, and write the task as JSON (or what --emit says)."""
-    from bbtc import artefacts, pipeline
+    from bbtc import pipeline
+    from bbtc.artefacts.jsontext import dumps
 
     session.expect_output(output, files, check=check, depfile=depfile)
     sources = [session.read(file) for file in files]
@@ -39,7 +40,9 @@ def command(
         reading = session.reading
         task = pipeline.compile_sources(sources, session.report, session.limits, reading, checks=True)
         if emit == "ground":
-            text = artefacts.dumps(artefacts.task_to_json(task))
+            from bbtc.artefacts.task_json import task_to_json
+
+            text = dumps(task_to_json(task))
         else:
             text = pipeline.process_text(task, emit)
         session.say(
@@ -47,14 +50,16 @@ def command(
             f"{len(task.templates)} templates"
         )
     else:
+        from bbtc.artefacts.stages_json import model_to_json, syntax_to_json
+
         documents = pipeline.parse_all(sources, session.report, session.limits)
         session.report.raise_errors()
         if emit == "ast":
-            text = artefacts.dumps(artefacts.syntax_to_json(documents))
+            text = dumps(syntax_to_json(documents))
         else:
             inputs = pipeline.select(documents, session.report, session.reading)
             session.report.raise_errors()
             assert inputs is not None
             model = pipeline.resolve_model(inputs, session.report, session.reading, checks=True)
-            text = artefacts.dumps(artefacts.model_to_json(model))
+            text = dumps(model_to_json(model))
     session.write(output, text, check=check, depfile=depfile)

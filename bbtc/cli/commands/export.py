@@ -8,7 +8,6 @@ from fractions import Fraction
 
 import click
 
-from bbtc.cli.commands.verify import require_verified
 from bbtc.cli.output import on_terminal
 from bbtc.cli.session import (
     Probability,
@@ -87,6 +86,8 @@ def command(
     if len(sources) == 1 and is_artefact(sources[0]) and is_tree(sources[0]):
         tree = tree_of(sources[0])
         if verified:
+            from bbtc.cli.commands.verify import require_verified
+
             require_verified(session, tree)
         artefact = export_tree(tree, form, pairs, session.limits)
         session.write(output, artefact, check=check, depfile=depfile)
@@ -96,6 +97,8 @@ def command(
     with best_tree_on_signals() as signals:
         tree = run_planner(session, task, target, strategy, limits, quiet=True, signals=signals).tree
         if verified:
+            from bbtc.cli.commands.verify import require_verified
+
             signals.end_at_once()
             require_verified(session, tree)
             signals.hold()

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bbtc.cli.commands.verify import require_verified
 from bbtc.cli.session import (
     Count,
     Probability,
@@ -94,7 +93,7 @@ def command(
     With --bounds, the best success probability of any policy is printed in place of a plan; 0: the
     target can be reached; 1: it cannot; 3: a limit leaves that open.
     """
-    from bbtc import artefacts
+    from bbtc.artefacts import dumps, tree_to_json
     from bbtc.cli.inputs import load_task
     from bbtc.planner.options import DEFAULTS, Options
     from bbtc.planner.strategies import require_strategy
@@ -112,9 +111,11 @@ def command(
     with best_tree_on_signals() as signals:
         plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet, signals=signals)
         if verified:
+            from bbtc.cli.commands.verify import require_verified
+
             signals.end_at_once()
             require_verified(session, plan.tree)
-        text = artefacts.dumps(artefacts.tree_to_json(plan.tree))
+        text = dumps(tree_to_json(plan.tree))
         session.write(output, text, check=check, depfile=depfile)
     return OF_TREE[plan.tree.status]
 
@@ -157,7 +158,6 @@ def run_planner(
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
     from bbtc.planner.options import DEFAULTS
-    from bbtc.planner.why_not import dead_ends
 
     options = options or DEFAULTS
     told: list[Refinement] = []
@@ -196,8 +196,11 @@ def run_planner(
         )
     most = options.max_actions
     ends: tuple[DeadEnd, ...] = ()
-    with suppress(LimitReached):
-        ends = dead_ends(plan.tree, limits.overtime(_TELLING))
+    if plan.tree.status == "out-of-reach":
+        from bbtc.planner.why_not import dead_ends
+
+        with suppress(LimitReached):
+            ends = dead_ends(plan.tree, limits.overtime(_TELLING))
     made = simplified_line(told[-1], plan.tree) if told and not quiet else []
     lines = [
         *made,

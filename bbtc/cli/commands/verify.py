@@ -33,14 +33,16 @@ def command(session: Session, tree: str, engine: Engine, as_json: bool, output: 
     The tree and its task become a Markov chain in the PRISM language, which is solved anew. Exit status
     1: a figure is not what the tree claims, or the tree is not sound.
     """
-    from bbtc import artefacts
     from bbtc.cli.inputs import tree_of
     from bbtc.pipeline import verify_tree
 
     session.expect_output(output, [tree])
     verdict = verify_tree(tree_of(session.read(tree)), session.limits, engine)
     if as_json:
-        session.write(output, artefacts.dumps(artefacts.verdict_to_json(verdict)))
+        from bbtc.artefacts.jsontext import dumps
+        from bbtc.artefacts.verdict_json import verdict_to_json
+
+        session.write(output, dumps(verdict_to_json(verdict)))
     else:
         session.write(output, "".join(f"{line}\n" for line in verdict_report(verdict)))
     verdict.raise_problems()

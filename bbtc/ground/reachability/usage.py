@@ -42,6 +42,11 @@ class Usage:
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
         self.open = open_predicates(model)
+        self._readers: dict[str, set[str]] = {}
+        """By predicate: the derived ones that a rule computes from it."""
+        for rule in model.rules:
+            for atom in mf.atoms(rule.condition):
+                self._readers.setdefault(atom.predicate, set()).add(rule.predicate)
         certain = set(model.predicates) - self.derived - self.uncertain
         self.unchanging = self._only_reading(certain - set(self.set_values))
         self.fixed = self._only_reading(certain - self.open)
@@ -64,15 +69,11 @@ class Usage:
         """Derived predicates that only read, all the way down, predicates of ``base``. Where these are
         certain and never change, so are they: ``unchanging`` in the model, ``fixed`` whatever others do."""
         found = set(self.derived)
-        shrunk = True
-        while shrunk:
-            shrunk = False
-            for rule in self.model.rules:
-                if rule.predicate in found and not all(
-                    atom.predicate in found or atom.predicate in base for atom in mf.atoms(rule.condition)
-                ):
-                    found.discard(rule.predicate)
-                    shrunk = True
+        others = [name for name in self._readers if name not in base and name not in found]
+        while others:
+            lost = found.intersection(self._readers.get(others.pop(), ()))
+            found -= lost
+            others.extend(lost)
         return found
 
     def _loose(self) -> set[tuple[str, int]]:

@@ -23,9 +23,9 @@ from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.mdp.explore import Choices, Explorer
-from bbtc.planner.mdp.graph import Floats, Graph, sums
+from bbtc.planner.mdp.graph import Floats, Graph, draw_probabilities, sums
 from bbtc.planner.mdp.h_add import Costs, Relaxation
-from bbtc.planner.mdp.maxprob import Bounds, MaxProb, draw_probabilities, max_prob
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index

@@ -9,8 +9,8 @@ from fractions import Fraction
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.planner.mdp.graph import Floats, Graph, sums
-from bbtc.planner.mdp.maxprob import Bounds, draw_probabilities
+from bbtc.planner.mdp.graph import Floats, Graph, draw_probabilities, sums
+from bbtc.planner.mdp.maxprob import Bounds
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.rounding import rounded

@@ -141,3 +141,10 @@ class Graph:
 def sums(owners: Index | Number, weights: Floats, count: int) -> Floats:
     """For each of ``count`` owners, the sum of its weights."""
     return np.bincount(owners, weights=weights, minlength=count).astype(np.float64, copy=False)
+
+
+def draw_probabilities(space: StateSpace) -> Floats:
+    """The probability of each edge."""
+    table = np.array([float(draw.probability) for draw in space.draws] or [0.0])
+    found: Floats = table[space.edge_draw]
+    return found

@@ -5,10 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-import numpy as np
-import numpy.typing as npt
 from typing_extensions import assert_never
 
 from bbtc.belief.state import Values
@@ -16,10 +14,14 @@ from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 
+if TYPE_CHECKING:  # a strategy that keeps states as integers loads no NumPy
+    import numpy as np
+    import numpy.typing as npt
+
 WORD = 64
-Words: TypeAlias = npt.NDArray[np.uint64]
+Words: TypeAlias = "npt.NDArray[np.uint64]"
 """Packed states, a row each."""
-Flags: TypeAlias = npt.NDArray[np.bool_]
+Flags: TypeAlias = "npt.NDArray[np.bool_]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,11 +84,15 @@ class Packing:
 
     def split(self, packed: Iterable[int]) -> Words:
         """Integers of bits as rows of words."""
+        import numpy as np
+
         rows = [p.to_bytes(self.words * 8, "little") for p in packed]
         return np.frombuffer(b"".join(rows), dtype="<u8").astype(np.uint64).reshape(len(rows), self.words)
 
     def bit_columns(self, states: Words) -> npt.NDArray[np.uint8]:
         """Bits (rows) by state (columns): 0 or 1."""
+        import numpy as np
+
         octets = np.ascontiguousarray(states.astype("<u8", copy=False).T).view(np.uint8)
         by_octet = octets.reshape(self.words, len(states), 8).transpose(0, 2, 1)
         found: npt.NDArray[np.uint8] = np.empty((self.words, 8, 8, len(states)), dtype=np.uint8)
@@ -96,6 +102,8 @@ class Packing:
 
     def unpack(self, states: Words) -> npt.NDArray[np.uint8]:
         """The truth value of every variable in each row."""
+        import numpy as np
+
         octets = np.ascontiguousarray(states.astype("<u8")).view(np.uint8)
         bits = np.unpackbits(octets.reshape(len(states), self.words * 8), axis=1, bitorder="little")
         count = len(self.unknown)
@@ -225,6 +233,8 @@ def cubes(test: BitTest, most: int) -> list[Cube] | None:
 
 def holds(packing: Packing, test: BitTest, states: Words) -> Flags:
     """In which rows the test holds."""
+    import numpy as np
+
     match test:
         case Cube(mask, value):
             found = np.ones(len(states), dtype=np.bool_)

@@ -12,18 +12,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from bbtc.ground.condition import (
-    FALSE,
     TRUE,
     And,
     Condition,
-    Constant,
     Is,
     Known,
-    Not,
-    Or,
     conjunction,
     disjunction,
     negation,
+    replaced,
     variables,
 )
 from bbtc.ground.task import Task
@@ -266,16 +263,14 @@ def _certain(
 
 def certainly(task: Task, condition: Condition) -> Condition:
     """True where a condition is, and false where that is unknown, too."""
-    match condition:
-        case Is(variable, value) if value is not Truth.UNKNOWN and task.variables[variable].three_valued:
-            return And((Known(variable), condition))
-        case Is() | Known():
-            return condition
-        case And(parts):
-            return conjunction([certainly(task, part) for part in parts])
-        case Or(parts):
-            return disjunction([certainly(task, part) for part in parts])
-        case Not(part):
-            return certainly(task, negation(part))
-        case Constant(value):
-            return TRUE if value else FALSE
+
+    def certain(leaf: Is | Known) -> Condition:
+        if (
+            isinstance(leaf, Is)
+            and leaf.value is not Truth.UNKNOWN
+            and task.variables[leaf.variable].three_valued
+        ):
+            return And((Known(leaf.variable), leaf))
+        return leaf
+
+    return replaced(condition, certain)

@@ -13,7 +13,7 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.ground.condition import And, Condition, Is, Known, Not, Or
+from bbtc.ground.condition import Condition, Is, Known, leaves
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -185,15 +185,8 @@ def _literals(values: npt.NDArray[np.uint8]) -> list[Literal]:
 
 
 def _stated(condition: Condition) -> list[Literal]:
-    match condition:
-        case Is(variable, value):
-            test = {Truth.TRUE: Test.TRUE, Truth.FALSE: Test.FALSE, Truth.UNKNOWN: Test.UNKNOWN}[value]
-            return [Literal(variable, test)]
-        case Known(variable):
-            return [Literal(variable, Test.KNOWN)]
-        case And(parts) | Or(parts):
-            return [literal for part in parts for literal in _stated(part)]
-        case Not(part):
-            return _stated(part)
-        case _:
-            return []
+    tests = {Truth.TRUE: Test.TRUE, Truth.FALSE: Test.FALSE, Truth.UNKNOWN: Test.UNKNOWN}
+    return [
+        Literal(leaf.variable, tests[leaf.value] if isinstance(leaf, Is) else Test.KNOWN)
+        for leaf in leaves(condition)
+    ]

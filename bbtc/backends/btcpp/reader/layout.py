@@ -11,6 +11,7 @@ from bbtc.backends.btcpp.reader.patterns import has
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
 from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.markov import reachable
 
 _MODEL = "TreeNodesModel"
 _PORT = re.compile(r"[A-Za-z][\w-]*")
@@ -81,12 +82,7 @@ class Layout:
 
     def reachable(self) -> list[XmlElement]:
         """The BehaviorTrees that the main tree calls, and itself, in the order of the file."""
-        found, waiting = {self.main}, [self.main]
-        while waiting:
-            for name in self._calls(self.trees[waiting.pop()]):
-                if name in self.trees and name not in found:
-                    found.add(name)
-                    waiting.append(name)
+        found = reachable([self.main], lambda name: self._calls(self.trees[name]) & self.trees.keys())
         return [tree for name, tree in self.trees.items() if name in found]
 
     @staticmethod

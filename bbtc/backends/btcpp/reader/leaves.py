@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 
-from bbtc.artefacts.cursor import clip
+from bbtc.artefacts.cursor import clip, nearest
 from bbtc.backends.btcpp.names import objects_of
 from bbtc.backends.btcpp.reader.layout import is_port
 from bbtc.backends.btcpp.reader.patterns import tag_of
@@ -114,8 +113,7 @@ class Leaves:
         value = self.value(element, port, ports)
         found = self._objects.get(value)
         if found is None:
-            near = get_close_matches(value[:60], list(self._objects)[:2000], n=1)
-            hint = f"did you mean '{near[0]}'?" if near else None
+            hint = nearest(value, list(self._objects))
             message = f"no object of the task is called '{clip(value)}'"
             raise unreadable(self._document, element, "BBT0606", message, attribute=port, hint=hint)
         return found
@@ -124,8 +122,7 @@ class Leaves:
         found = [symbol for symbol in self._found(element) if symbol.kind == kind]
         word = "action" if kind == "action" else "condition"
         if not found:
-            near = get_close_matches(tag_of(element)[:60], list(self._possible)[:2000], n=1)
-            hint = f"did you mean '{near[0]}'?" if near else None
+            hint = nearest(tag_of(element), list(self._possible))
             message = f"no {word} of the task is written as '{clip(tag_of(element))}'"
             raise unreadable(self._document, element, "BBT0606", message, hint=hint)
         if len(found) > 1:
@@ -148,8 +145,5 @@ class Leaves:
         return best
 
     def _unknown(self, element: XmlElement, what: str, name: str, known: list[str]) -> Unreadable:
-        near = get_close_matches(name[:60], known[:2000], n=1)
-        hint = f"did you mean '{near[0]}'?" if near else None
-        return unreadable(
-            self._document, element, "BBT0606", f"the task has no {what} '{clip(name)}'", hint=hint
-        )
+        message = f"the task has no {what} '{clip(name)}'"
+        return unreadable(self._document, element, "BBT0606", message, hint=nearest(name, known))

@@ -1,0 +1,150 @@
+"""What may change by itself in the world of a task, and what else has to change with it.
+
+A change moves one fact, or one group of facts of which at most one is true (a robot's place), to another
+value. Groups are those of :mod:`bbtc.disturbance.mutexes`. A fact moves in one group at most, the largest
+first, as in Helmert, "Concise finite-domain representations for PDDL planning tasks" (2009), section 6; the
+other groups still bound what is possible: what a move contradicts gives way, with as few facts as can be, so
+that a can that falls from the gripper leaves it empty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from bbtc.belief.state import Values
+from bbtc.disturbance.mutexes import Group, exclusive_groups
+from bbtc.ground.task import Task, effects_of
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+
+_MOST_GIVING_WAY = 6  # facts that change besides those that move
+_MOST_TRIED = 2000  # sets of such facts
+
+_Sets = Mapping[int, Truth]
+
+
+@dataclass(frozen=True, slots=True)
+class Movable:
+    """What moves as one: a single variable with its values, or two or more variables of a group, of which one
+    is true, or none where ``emptied``."""
+
+    variables: tuple[int, ...]
+    values: tuple[Truth, ...] = ()
+    emptied: bool = False
+
+    def moves(self, state: Values) -> Iterator[_Sets]:
+        """What it may move to from a state, each as what it sets."""
+        if len(self.variables) == 1:
+            (variable,) = self.variables
+            for value in self.values:
+                if value != state[variable]:
+                    yield {variable: value}
+            return
+        left = {v: Truth.FALSE for v in self.variables if state[v] == Truth.TRUE}
+        for variable in self.variables:
+            if variable not in left:
+                yield left | {variable: Truth.TRUE}
+        if self.emptied and left:
+            yield dict.fromkeys(self.variables, Truth.FALSE)
+
+
+@dataclass(frozen=True, slots=True)
+class ChangingFacts:
+    """Everything that may change by itself in a task. Every variable of a task may: what is fixed is none."""
+
+    movables: tuple[Movable, ...]
+    groups: tuple[Group, ...]
+
+    @classmethod
+    def of(cls, task: Task, limits: Limits) -> ChangingFacts:
+        """Raises :class:`bbtc.diagnostics.LimitReached` when the time is over."""
+        groups = exclusive_groups(task, limits)
+        taken: set[int] = set()
+        movables: list[Movable] = []
+        for group in sorted(groups, key=lambda each: (not each.always, -len(each.members), each.members)):
+            own = tuple(v for v in group.members if v not in taken)
+            if len(own) > 1:
+                taken.update(own)
+                # What is left of a group may be empty, since the one that is true may stand in another.
+                movables.append(Movable(own, emptied=not group.always or len(own) < len(group.members)))
+        values = _values(task)
+        movables.extend(
+            Movable((variable,), values[variable]) for variable in range(len(values)) if variable not in taken
+        )
+        movables.sort(key=lambda each: each.variables)
+        return cls(tuple(movables), tuple(groups))
+
+    def changes(self, state: Values) -> tuple[tuple[Fraction, Values], ...]:
+        """Where one change may lead from a state, and how probably: whatever may move is as likely to do so,
+        then each of the values that it may take, then each way for other facts to give way. Empty where
+        nothing can move."""
+        ways: list[list[list[Values]]] = []
+        for movable in self.movables:
+            found = [self._settled(state, sets) for sets in movable.moves(state)]
+            ways.append([each for each in found if each])
+        ways = [each for each in ways if each]
+        merged: dict[Values, Fraction] = {}
+        for moves in ways:
+            for after in moves:
+                for values in after:
+                    chance = Fraction(1, len(ways) * len(moves) * len(after))
+                    merged[values] = merged.get(values, Fraction(0)) + chance
+        return tuple((chance, values) for values, chance in sorted(merged.items()))
+
+    def _settled(self, state: Values, sets: _Sets) -> list[Values]:
+        """The states after a move with the fewest other facts changed, so that no group is contradicted; none
+        if that takes too many."""
+        waiting: dict[tuple[tuple[int, Truth], ...], None] = {tuple(sorted(sets.items())): None}
+        tried = 0
+        for _ in range(_MOST_GIVING_WAY + 1):
+            found: list[Values] = []
+            further: dict[tuple[tuple[int, Truth], ...], None] = {}
+            for fixed in waiting:
+                tried += 1
+                if tried > _MOST_TRIED:
+                    return []
+                now = dict(fixed)
+                more = self._lacking(state, now)
+                if more is None:
+                    after = bytearray(state)
+                    for variable, value in fixed:
+                        after[variable] = value
+                    found.append(bytes(after))
+                    continue
+                for variable, value in more:
+                    further[tuple(sorted((now | {variable: value}).items()))] = None
+            if found:
+                return found
+            waiting = further
+        return []
+
+    def _lacking(self, state: Values, fixed: dict[int, Truth]) -> list[tuple[int, Truth]] | None:
+        """What could change next to mend the first group that is contradicted; None if none is."""
+        for group in self.groups:
+            if not any(member in fixed for member in group.members):
+                continue
+            true = [v for v in group.members if fixed.get(v, state[v]) == Truth.TRUE]
+            if len(true) > 1:
+                return [(v, Truth.FALSE) for v in true if v not in fixed][:1]
+            if group.always and not true:
+                return [(v, Truth.TRUE) for v in group.members if v not in fixed]
+        return None
+
+
+def _values(task: Task) -> list[tuple[Truth, ...]]:
+    """The values that each variable can take: at the start and by effects. A variable that nothing in the
+    task changes is one that others do, and can take all."""
+    found: list[set[Truth]] = [set() for _ in task.variables]
+    for initial in task.initial:
+        for own, value in zip(found, initial.values, strict=True):
+            own.add(value)
+    for action in task.actions:
+        for effect in effects_of(action.factors):
+            for variable, value in effect.sets:
+                found[variable].add(value)
+    return [
+        tuple(value for value in variable.values if value in own) if len(own) > 1 else variable.values
+        for variable, own in zip(task.variables, found, strict=True)
+    ]

@@ -1,0 +1,143 @@
+"""Facts that exclude each other, and what changes of themselves: compared with all states that can be
+reached."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from random import Random
+
+import pytest
+
+import bbtc
+from bbtc.belief.state import Values
+from bbtc.disturbance.facts import ChangingFacts
+from bbtc.disturbance.mutexes import exclusive_groups
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.source import SourceFile
+from tests.disturbance.reference import reachable
+from tests.long_form import amount
+from tests.replay.random_trees import random_task
+
+DOMAIN = """
+(define (domain courier)
+  (:requirements :strips :typing :conditional-effects)
+  (:types place door parcel)
+  (:predicates (at ?p - place) (lies ?x - parcel ?p - place) (held ?x - parcel) (hand_free)
+               (external (shut ?d - door)) (seen ?x - parcel))
+  (:action move :parameters (?p - place)
+    :precondition (forall (?d - door) (not (shut ?d)))
+    :effect (and (forall (?q - place) (not (at ?q))) (at ?p)))
+  (:action take :parameters (?x - parcel ?p - place)
+    :precondition (and (at ?p) (lies ?x ?p) (hand_free))
+    :effect (and (held ?x) (not (lies ?x ?p)) (not (hand_free)) (seen ?x)))
+  (:action put :parameters (?x - parcel ?p - place)
+    :precondition (and (at ?p) (held ?x))
+    :effect (and (lies ?x ?p) (not (held ?x)) (hand_free))))
+"""
+PROBLEM = """
+(define (problem two) (:domain courier)
+  (:objects hall yard - place gate - door cup pen - parcel)
+  (:init (at hall) (lies cup hall) (lies pen yard) (hand_free))
+  (:goal (and (lies cup yard) (seen cup) (lies pen hall) (not (shut gate)))))
+"""
+
+
+DOMAINS = Path(__file__).parents[2] / "domains"
+PROBLEMS = ["charging/one-room", "delivery/letter-for-anna", "doors/to-the-lab", "inspection/shut-down",
+            "kitting/gift-set", "trolley/with-spares", "warehouse/one-order"]  # fmt: skip
+
+
+def courier() -> Task:
+    return bbtc.compile(SourceFile("domain.pddl", DOMAIN), SourceFile("problem.pddl", PROBLEM))
+
+
+def true_in(task: Task, values: Values) -> set[str]:
+    return {variable.name for variable, value in zip(task.variables, values, strict=True) if value == 2}
+
+
+def state(task: Task, *true: str) -> Values:
+    assert set(true) <= {variable.name for variable in task.variables}
+    return bytes(2 if variable.name in true else 0 for variable in task.variables)
+
+
+def test_the_places_of_a_robot_and_of_what_it_carries_are_groups() -> None:
+    task = courier()
+    named = {
+        frozenset(task.variables[member].name for member in group.members): group.always
+        for group in exclusive_groups(task, Limits())
+    }
+    assert named == {
+        frozenset({"at(hall)", "at(yard)"}): True,
+        frozenset({"lies(cup,hall)", "lies(cup,yard)", "held(cup)"}): True,
+        frozenset({"lies(pen,hall)", "lies(pen,yard)", "held(pen)"}): True,
+        frozenset({"held(cup)", "held(pen)", "hand_free()"}): True,
+    }
+
+
+def test_a_robot_moves_a_door_shuts_and_what_falls_leaves_the_hand_free() -> None:
+    task = courier()
+    facts = ChangingFacts.of(task, Limits())
+    start = state(task, "at(yard)", "held(cup)", "lies(pen,yard)", "seen(cup)")
+    chances = {frozenset(true_in(task, after)): chance for chance, after in facts.changes(start)}
+    # The robot, the hand, the cup, the pen, the gate, and seen(cup): each is as likely to change. Nobody asks
+    # whether the pen was seen.
+    sixth = Fraction(1, 6)
+    now = true_in(task, start)
+    cup_at_hall = frozenset(now - {"held(cup)"} | {"lies(cup,hall)", "hand_free()"})
+    cup_at_yard = frozenset(now - {"held(cup)"} | {"lies(cup,yard)", "hand_free()"})
+    # What comes into the hand makes the cup fall out of it, to one place or the other.
+    pen_and_hall = frozenset(now - {"lies(pen,yard)", "held(cup)"} | {"held(pen)", "lies(cup,hall)"})
+    pen_and_yard = frozenset(now - {"lies(pen,yard)", "held(cup)"} | {"held(pen)", "lies(cup,yard)"})
+    assert chances == {
+        frozenset(now - {"at(yard)"} | {"at(hall)"}): sixth,
+        cup_at_hall: sixth / 4 + sixth / 2,  # the hand opens, or the cup is moved
+        cup_at_yard: sixth / 4 + sixth / 2,
+        pen_and_hall: sixth / 4 + sixth / 4,  # the hand is given the pen, or the pen is put into it
+        pen_and_yard: sixth / 4 + sixth / 4,
+        frozenset(now - {"lies(pen,yard)"} | {"lies(pen,hall)"}): sixth / 2,
+        frozenset(now | {"shut(gate)"}): sixth,
+        frozenset(now - {"seen(cup)"}): sixth,
+    }
+
+
+def test_no_state_that_can_be_reached_has_two_of_a_group() -> None:
+    found = 0
+    for seed in range(amount(200, 5000)):
+        task = random_task(Random(seed))
+        states = reachable(task)
+        assert states is not None
+        found += check(task, states)
+    assert found > 2, "there are groups to look at"
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_no_state_of_a_domain_has_two_of_a_group(problem: str) -> None:
+    folder = problem.partition("/")[0]
+    task = bbtc.compile(DOMAINS / folder / "domain.pddl", DOMAINS / f"{problem}.pddl")
+    states = reachable(task)
+    assert states is None or check(task, states) > 0
+
+
+def check(task: Task, states: set[tuple[int, ...]]) -> int:
+    """Groups, of which the number is returned, hold in all states that can be reached, and changes keep to
+    them."""
+    groups = exclusive_groups(task, Limits())
+    facts = ChangingFacts.of(task, Limits())
+
+    def kept(values: Values) -> bool:
+        counts = [(sum(values[member] == 2 for member in group.members), group.always) for group in groups]
+        return all(count == 1 or (count == 0 and not always) for count, always in counts)
+
+    for values in sorted(states)[:50]:
+        assert kept(bytes(values))
+        found = facts.changes(bytes(values))
+        assert not found or sum(chance for chance, _ in found) == 1
+        for _, after in found:
+            assert kept(after)
+            assert after != bytes(values)
+            assert all(
+                value in variable.values for value, variable in zip(after, task.variables, strict=True)
+            )
+    return len(groups)
