@@ -67,20 +67,23 @@ def _keep(best: BestTree, solver: Solver, solved: Solved, limits: Limits) -> Non
     rules = Rules(solver.model, solver.exclusion, solved, limits)
     try:
         for _ in range(_MOST_SHORT):
-            chain = _keep_if_sure(best, solver, rules.short(), limits.part(_FOR_SHORT))
-            if chain is None or not rules.meet(solver.model.packing.pack(each.values) for each in chain.states):
+            chain = _keep_if_sure(best, solver, solved, rules.short(), limits.part(_FOR_SHORT))
+            if chain is None:
+                return
+            if not rules.meet(solver.model.packing.pack(state.values) for state in chain.states):
                 break
     except LimitReached:
         limits.check_time("the search for a small tree")
-    if best.success < 1:
-        _keep_if_sure(best, solver, rules.plain(), limits)
+    _keep_if_sure(best, solver, solved, rules.plain(), limits)
 
 
-def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits: Limits) -> Chain | None:
+def _keep_if_sure(
+    best: BestTree, solver: Solver, solved: Solved, rules: Sequence[Rule], limits: Limits
+) -> Chain | None:
     """Keep a tree that succeeds always; of another one, return the chain."""
     root = tree_of(solver.task, solver.model, rules)
     limits.check_nodes(size(root))
-    chain = chain_of(solver, root, limits)
+    chain = chain_of(solver, solved, root, limits)
     success = success_of(chain)
     if success < 1:
         return chain
@@ -88,10 +91,12 @@ def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits:
     return None
 
 
-def chain_of(solver: Solver, root: Node, limits: Limits) -> Chain:
+def chain_of(solver: Solver, solved: Solved, root: Node, limits: Limits) -> Chain:
     """The chain of a tree, or where it is large, its quotient."""
-    try:
-        return explore(solver.task, root, replace(limits, states=min(limits.states, _FEW_STATES)))
-    except LimitReached:
-        limits.check_time("the simulation")
+    few = min(limits.states, _FEW_STATES)
+    if len(solved.visited) <= few:  # the tree gets to all that the policy visits, and maybe more
+        try:
+            return explore(solver.task, root, replace(limits, states=few))
+        except LimitReached:
+            limits.check_time("the simulation")
     return quotient_chain(solver.task, root, limits, solver.model, solver.exclusion)

@@ -91,6 +91,9 @@ class Searcher:
     ) -> WeakPlan | Exhausted:
         """A plan from a state to one that has ``arrived``, by steps that are not forbidden. ``on_dead_end``
         is told every dead end of the relaxation, and the step that led to it."""
+        at_once = self._at_once(start, arrived)
+        if at_once is not None:
+            return at_once
         parent: dict[int, Taken | None] = {start: None}
         depth = {start: 0}
         frontier = _Frontier(start)
@@ -132,6 +135,14 @@ class Searcher:
                 return _traced(parent, ahead)
         return Exhausted(tuple(frontier.expanded), tuple(dead))
 
+    def _at_once(self, start: int, arrived: Callable[[int], bool]) -> WeakPlan | None:
+        """A plan of one step, for which no distance need be known."""
+        for number in self.model.applicable(start):
+            for step in self.model.actions[number].steps:
+                after = step.apply(start)
+                if after != start and arrived(after) and self.forbidden.forbids(start, number) is None:
+                    return WeakPlan((Taken(start, number, step),), after)
+        return None
 
     def _followed(
         self, start: int, found: Estimate, arrived: Callable[[int], bool]
