@@ -7,7 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from fractions import Fraction
-from itertools import product
+from itertools import permutations, product
 from random import Random
 
 import pytest
@@ -417,6 +417,31 @@ def test_a_way_that_may_end_in_a_dead_end_is_not_taken() -> None:
     assert done.tree.status == "target-reached"
     assert not [node.action for node in actions_of(done.tree.root) if node.action.endswith("p5)")]
     assert plan(walk(12, bare=(5,))).tree.status == "out-of-reach"
+
+
+SHORT_CUT = """
+(define (domain cut)
+  (:predicates (asleep) (here) (half) (far) (near) (there) (rope) (shoes) (slipped))
+  (:action wake :precondition (asleep) :effect (and (not (asleep)) (here) (oneof {})))
+  (:action walk :precondition (and (here) (not (slipped))) :effect (and (not (here)) (half)))
+  (:action walk-on :precondition (and (half) (not (slipped))) :effect (and (not (half)) (far)))
+  (:action and-on :precondition (and (far) (not (slipped))) :effect (and (not (far)) (near)))
+  (:action arrive :precondition (and (near) (not (slipped))) :effect (and (not (near)) (there)))
+  (:action climb :precondition (and (here) (rope) (not (slipped)))
+    :effect (and (not (rope)) (oneof (and (not (here)) (there)) (slipped))))
+  (:action stand-up :precondition (and (slipped) (shoes)) :effect (and (not (slipped)) (not (here)) (there))))
+(define (problem p) (:domain cut) (:init (asleep)) (:goal (there)))
+"""
+
+
+@pytest.mark.parametrize("order", list(permutations(("(and (rope) (shoes))", "(and)", "(rope)"))))
+def test_a_short_cut_is_no_way_where_one_of_its_outcomes_needs_what_is_missing(order: tuple[str]) -> None:
+    """Whichever state is seen first: with a rope and no shoes the state is like the one with neither in all
+    that walking needs, and the short cut, the first choice where there is a rope, may end without hope."""
+    of = task_of(SHORT_CUT.format(" ".join(order)))
+    done = plan(of)
+    assert done.tree.status == "target-reached"
+    assert simulate(of, done.tree.root, Limits()).success == 1
 
 
 def test_groups_of_exclusive_facts_are_found() -> None:
