@@ -56,6 +56,8 @@ class ChangingFacts:
 
     movables: tuple[Movable, ...]
     groups: tuple[Group, ...]
+    _around: Mapping[int, tuple[int, ...]]
+    """The numbers of the groups that each variable is in."""
 
     @classmethod
     def of(cls, task: Task, limits: Limits) -> ChangingFacts:
@@ -74,7 +76,11 @@ class ChangingFacts:
             Movable((variable,), values[variable]) for variable in range(len(values)) if variable not in taken
         )
         movables.sort(key=lambda each: each.variables)
-        return cls(tuple(movables), tuple(groups))
+        around: dict[int, tuple[int, ...]] = {}
+        for number, group in enumerate(groups):
+            for member in group.members:
+                around[member] = (*around.get(member, ()), number)
+        return cls(tuple(movables), tuple(groups), around)
 
     def changes(self, state: Values) -> tuple[tuple[Fraction, Values], ...]:
         """Where one change may lead from a state, and how probably: whatever may move is as likely to do so,
@@ -122,9 +128,8 @@ class ChangingFacts:
 
     def _lacking(self, state: Values, fixed: dict[int, Truth]) -> list[tuple[int, Truth]] | None:
         """What could change next to mend the first group that is contradicted; None if none is."""
-        for group in self.groups:
-            if not any(member in fixed for member in group.members):
-                continue
+        for number in sorted({number for variable in fixed for number in self._around.get(variable, ())}):
+            group = self.groups[number]
             true = [v for v in group.members if fixed.get(v, state[v]) == Truth.TRUE]
             if len(true) > 1:
                 return [(v, Truth.FALSE) for v in true if v not in fixed][:1]

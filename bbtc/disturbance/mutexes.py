@@ -53,8 +53,8 @@ class _Way:
     parts: tuple[_Part, ...]
 
     def certain(self, known: PartialState) -> tuple[int, int]:
-        """The bits made true, and those of variables that are not true afterwards, in states that satisfy it:
-        also those that end if they are true at all."""
+        """The bits made true in states that satisfy it, and of the others those that are not true afterwards,
+        also where an effect ends them only if they are true."""
         makes = ends = 0
         for part in self.parts:
             lacking = part.when.mask & ~known.mask | (part.when.value ^ known.value) & part.when.mask
@@ -63,7 +63,7 @@ class _Way:
                 ends |= part.ends
             elif lacking & lacking - 1 == 0 and lacking & part.ends and lacking & part.when.value:
                 ends |= lacking
-        return makes, ends & ~makes
+        return makes, ends
 
 
 def exclusive_groups(task: Task, limits: Limits) -> list[Group]:
@@ -131,6 +131,7 @@ class _Pairs:
 
     def __init__(self, task: Task) -> None:
         self.mates = [0] * len(task.variables)
+        self._some = 0  # all that may be true
         self._every = (1 << len(task.variables)) - 1
         for values in initial_belief(task):
             true = sum(1 << v for v, value in enumerate(values) if value == Truth.TRUE)
@@ -143,6 +144,7 @@ class _Pairs:
             fresh = other & ~self.mates[bit]
             if fresh:
                 news = True
+                self._some |= fresh | 1 << bit
                 self.mates[bit] |= fresh
                 for mate in set_bits(fresh):
                     self.mates[mate] |= 1 << bit
@@ -150,7 +152,7 @@ class _Pairs:
 
     def _possible(self, known: PartialState) -> int | None:
         """The bits of all that may be true with what is known to be; None if that cannot be."""
-        room = sum(1 << v for v, mates in enumerate(self.mates) if mates)
+        room = self._some
         true = known.value & self._every
         for bit in set_bits(true):
             room &= self.mates[bit]
@@ -167,7 +169,6 @@ class _Pairs:
             room = self._possible(known)
             if room is not None:
                 makes, ends = way.certain(known)
-                makes |= part.makes
                 news |= self._join(makes, makes | room & ~ends)
         if len(making) > _MOST_PARTS:
             whole = 0

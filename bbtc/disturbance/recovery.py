@@ -24,7 +24,7 @@ from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.intervals import Interval, score, wilson
-from bbtc.ground.condition import FALSE, Condition, compile_condition
+from bbtc.ground.condition import FALSE, Condition, compile_condition, conjunction, conjuncts, evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -32,6 +32,7 @@ from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.maxprob import MaxProb, max_prob
 from bbtc.planner.mdp.packing import bit_test, holds
 from bbtc.planner.mdp.state_space import StateSpace
+from bbtc.planner.mdp.state_table import StateTable
 from bbtc.tree.nodes import Node
 
 ALL_UP_TO = 10_000
@@ -189,8 +190,17 @@ def _figures(task: Task, root: Node, limits: Limits, found: _Found) -> Recovery:
 
 def _in_reach(found: _Found, ends: Sequence[int]) -> set[int]:
     """Those of some final states of the chain from which the goal is in reach."""
-    row_of = {values: row for row, values in enumerate(_values(found.space, range(len(found.space.states))))}
-    return {end for end in ends if found.best.bounds(row_of[found.chain.states[end].values]).upper}
+    table = StateTable(found.space.packing.words)
+    table.number(found.space.states)
+    packing = found.space.packing
+    packed = packing.split(packing.pack(found.chain.states[end].values) for end in ends)
+    rows = table.number(packed).tolist()
+    return {end for end, row in zip(ends, rows, strict=True) if found.best.bounds(row).upper}
+
+
+def _missing(condition: Condition, values: Values) -> Condition:
+    """The conjuncts of a condition that are not true in a state."""
+    return conjunction(part for part in conjuncts(condition) if evaluate(part, values) is not Truth.TRUE)
 
 
 def _given_up(task: Task, root: Node, chain: Chain, ends: dict[int, Fraction]) -> tuple[GivenUp, ...]:
@@ -200,7 +210,8 @@ def _given_up(task: Task, root: Node, chain: Chain, ends: dict[int, Fraction]) -
         if share:
             stop = finder.stopped(chain.states[end])
             status = chain.status[end] if stop.status is None else stop.status
-            key = (stop.condition, status, stop.condition is None and stop.node is not None)
+            missing = None if stop.condition is None else _missing(stop.condition, chain.states[end].values)
+            key = (missing, status, missing is None and stop.node is not None)
             groups.setdefault(key, {})[end] = stop.node or root.id
     made = []
     for (condition, status, used_up), nodes in groups.items():

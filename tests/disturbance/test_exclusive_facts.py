@@ -13,7 +13,9 @@ import bbtc
 from bbtc.belief.state import Values
 from bbtc.disturbance.facts import ChangingFacts
 from bbtc.disturbance.mutexes import exclusive_groups
-from bbtc.ground.task import Task
+from bbtc.ground.condition import TRUE, Condition, Is, conjunction
+from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
 from tests.disturbance.reference import reachable
@@ -110,6 +112,53 @@ def test_no_state_that_can_be_reached_has_two_of_a_group() -> None:
         assert states is not None
         found += check(task, states)
     assert found > 2, "there are groups to look at"
+
+
+def moving_task(rng: Random) -> Task:
+    """Facts of a few places that actions move about, mostly from one to another, and often only where a fact
+    holds; many of them keep to a group, and many nearly do."""
+    names = [("at", "a"), ("at", "b"), ("at", "c"), ("on", "a"), ("on", "b"), ("off", "a")]
+    variables = tuple(Variable(name, (arg,), False) for name, arg in sorted(names))
+    count = len(variables)
+
+    def literals(most: int) -> Condition:
+        picked = rng.sample(range(count), rng.randint(0, most))
+        return conjunction(Is(v, rng.choice([Truth.TRUE, Truth.TRUE, Truth.FALSE])) for v in picked)
+
+    def effect() -> Effect:
+        one, two, three = rng.sample(range(count), 3)
+        when = rng.choice([None, Is(one, Truth.TRUE), Is(three, Truth.FALSE), literals(2)])
+        sets = {one: Truth.FALSE, two: Truth.TRUE}
+        if rng.random() < 0.3:
+            del sets[rng.choice([one, two])]
+        if rng.random() < 0.4:
+            sets[three] = Truth.FALSE
+        return Effect(when, tuple(sorted(sets.items())))
+
+    def action(number: int) -> GroundAction:
+        precondition = literals(2)
+        effects = [effect() for _ in range(rng.randint(1, 3))]
+        if rng.random() < 0.4:  # to go to a place leaves all of them
+            place = rng.randrange(3)
+            effects = [Effect(None, tuple((v, Truth(2 * (v == place))) for v in range(3)))]
+        return GroundAction(
+            f"act{number}", (), precondition, (Factor((Outcome(Fraction(1), tuple(effects)),)),)
+        )
+
+    start = [Truth.FALSE] * count
+    for number in rng.sample(range(count), 2):
+        start[number] = Truth.TRUE
+    actions = tuple(action(number) for number in range(rng.randint(1, 3)))
+    return Task("moving", "one", variables, (InitialState(Fraction(1), tuple(start)),), TRUE, actions)
+
+
+def test_no_state_of_facts_that_move_about_has_two_of_a_group() -> None:
+    found = sum(
+        check(task, states)
+        for task in map(moving_task, map(Random, range(amount(1500, 30_000))))
+        if (states := reachable(task)) is not None
+    )
+    assert found > 100, "there are groups to look at"
 
 
 @pytest.mark.parametrize("problem", PROBLEMS)

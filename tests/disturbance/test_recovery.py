@@ -10,8 +10,10 @@ import pytest
 
 import bbtc
 from bbtc.disturbance.recovery import Recovery
+from bbtc.ground.condition import Condition, Is, Known
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 from tests.cli.program import bbtc as program
@@ -62,10 +64,10 @@ def compare(task: Task, root: Node, found: Recovery, ticks: int) -> None:
 @pytest.mark.parametrize("guarded", [False, True])
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_figures_are_those_of_value_iteration_and_of_a_plain_interpreter(problem: str, guarded: bool) -> None:
-    tree = bbtc.plan(*files(problem), guarded=guarded).tree
+    tree = bbtc.plan(*files(problem), guarded=guarded, retries="least").tree
     found = bbtc.recovery(tree)
     compare(tree.task, tree.root, found, 300)
-    assert bool(found.lost) == problem.startswith(("kitting", "warehouse")), "there things break for good"
+    assert found.lost or not problem.startswith("kitting"), "there things break for good"
 
 
 def test_figures_of_random_trees_are_those_of_value_iteration_and_of_a_plain_interpreter() -> None:
@@ -79,17 +81,43 @@ def test_figures_of_random_trees_are_those_of_value_iteration_and_of_a_plain_int
     assert all(kinds.values()), kinds
 
 
+LAMP = """
+(define (domain lamp)
+  (:types place)
+  (:predicates (at ?p - place) (lit) (bulb) (unknown (warm)))
+  (:action go :parameters (?p - place)
+    :effect (and (forall (?q - place) (not (at ?q))) (at ?p)))
+  (:action press :precondition (at desk) :effect (when (bulb) (probabilistic 3/4 (lit) 1/4 (not (bulb)))))
+  (:action touch :precondition (at desk) :effect (probabilistic 1/2 (warm) 1/2 (not (warm))))
+  (:action rest :precondition (at bed) :effect (not (lit)))
+  (:constants desk bed - place))
+(define (problem light) (:domain lamp) (:init (at desk) (bulb)) (:goal (and (lit) (not (warm)))))
+"""
+
+
 def test_where_it_gives_up_is_told_by_the_fact_that_is_missing() -> None:
-    # From the desk, a fresh tree asks at the reception for nobody: the robot has to be there.
-    tree = bbtc.plan(*files("delivery/letter-for-anna")).tree
+    # A tree by hand touches the lamp while nothing is known of it, then presses the switch, but never goes to
+    # the desk. With the lamp off it is lost where the bulb has gone, which nothing mends.
+    task = bbtc.compile(bbtc.SourceFile("lamp.pddl", LAMP))
+    number = task.variable_index
+    lit, there = Is(number["lit()"], Truth.TRUE), Is(number["at(desk)"], Truth.TRUE)
+
+    def first(name: str, done: Condition, action: str) -> Node:
+        there_now = ConditionNode(f"{name}3", there)
+        attempt = ControlNode(f"{name}2", "sequence", (there_now, ActionNode(f"{name}4", action, True)))
+        return ControlNode(name, "fallback", (ConditionNode(f"{name}1", done), attempt))
+
+    steps = (first("a", Known(number["warm()"]), "touch()"), first("b", lit, "press()"))
+    root = ControlNode("n", "sequence", (*steps, ConditionNode("c", task.goal)))
+    tree = Tree(task, root, Fraction(0), Fraction(1), "stuck")
     found = bbtc.recovery(tree)
-    told = [describe(tree.task, each.condition) for each in found.given_up if each.condition is not None]
-    assert told == ["at(desk12)", "at(reception)"]
-    assert found.attained < found.hopeful
-    for each in found.given_up:
-        assert each.condition is not None
-        values = dict(zip((v.name for v in tree.task.variables), each.example, strict=True))
-        assert values[describe(tree.task, each.condition)] != 2
+    compare(task, tree.root, found, 300)
+    told = {describe(task, each.condition): each for each in found.given_up if each.condition is not None}
+    # At the desk it gives up where the lamp is warm; what it lacks elsewhere is to be there.
+    assert set(told) == {"at(desk)", "not warm()"}
+    assert told["not warm()"].example[number["warm()"]] == 2
+    assert all(each.example[number["at(desk)"]] == 0 for name, each in told.items() if name == "at(desk)")
+    assert found.lost > 0
 
 
 def test_a_sample_is_near_to_the_whole_and_says_how_near() -> None:
@@ -139,10 +167,23 @@ def test_the_command_writes_the_same(tmp_path: Path) -> None:
     assert f"recovery from all {few.states} states that its actions lead to" in text
 
 
-def test_more_states_than_allowed_are_a_limit(tmp_path: Path) -> None:
-    tree = bbtc.plan(*files("warehouse/one-order")).tree
+def test_more_states_than_allowed_are_a_limit_after_which_all_else_is_told(tmp_path: Path) -> None:
+    domain, problem = files("warehouse/one-order")
+    task = bbtc.compile(domain, problem)
+    tree = Tree(task, ConditionNode("n1", task.goal), Fraction(0), Fraction(1), "stuck")
     (tmp_path / "tree.json").write_text(bbtc.dumps(tree), "utf-8")
     with pytest.raises(bbtc.LimitReached):
         bbtc.recovery(tree, limits=Limits(states=20))
+    options = ["--perturb", "5%", "--runs", "10", "--recovery", "--max-states", "20", "--json"]
+    run = program("simulate", tmp_path / "tree.json", domain, problem, *options)
+    assert run.returncode == 3
+    assert "the limit of 20 states" in run.stderr
+    data = json.loads(run.stdout)
+    assert data["success"] == "0"
+    assert data["perturbed"]["runs"] == 10
+    assert "recovery" not in data
+
+
+def test_less_than_one_sample_is_refused() -> None:
     with pytest.raises(ValueError):
-        bbtc.recovery(tree, samples=0)
+        bbtc.recovery(bbtc.plan(*files("warehouse/one-order")).tree, samples=0)

@@ -44,6 +44,10 @@ PACKAGES = {
         "tests/verifier/test_plans.py",
         "tests/domains/test_against_lifted.py",
     ),
+    "bbtc/disturbance": (
+        "tests/disturbance",
+        "tests/replay/test_perturbed.py",
+    ),
     "bbtc/rewrite": (
         *_WHOLE,
         "tests/planner",

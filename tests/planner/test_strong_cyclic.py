@@ -7,7 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from fractions import Fraction
-from itertools import product
+from itertools import permutations, product
 from random import Random
 
 import pytest
@@ -32,10 +32,13 @@ from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.planner.strong_cyclic.partial_state import PartialState, as_conditions, contains, satisfied, united
 from bbtc.planner.strong_cyclic.quotient import _Ticks, quotient_chain
+from bbtc.planner.strong_cyclic.relaxation import Relaxation
+from bbtc.planner.strong_cyclic.rules import Rules, tree_of
 from bbtc.planner.strong_cyclic.solve import Solved, Solver
 from bbtc.planner.strong_cyclic.visit import Visit
 from bbtc.tree.nodes import ActionNode, ControlNode, Node, actions_of
 from bbtc.tree.validate import check_tree
+from tests.benchmarks.chains import FAMILIES
 from tests.conftest import REPOSITORY
 from tests.ground.examples import task_of
 from tests.long_form import amount
@@ -171,6 +174,52 @@ def test_states_with_the_explanation_of_another_have_its_figures(data: st.DataOb
         if state not in visit.nodes and visit.explained.number(state) is not None:
             like = unpacked(packing, visit.representative(state))
             assert outcome(values) == outcome(like)
+
+
+@examples(amount(150, 5000))
+@given(of=tasks(most_actions=6), random=st.randoms(use_true_random=False))
+def test_a_distance_does_not_depend_on_what_was_asked_before(of: Task, random: Random) -> None:
+    """The relaxation goes from state to state by what differs, and learns what is forbidden on the way."""
+    solver = Solver(of, Limits())
+    reachable, safe = strong_cyclic_states(of)
+    states = sorted(reachable)[:30]
+    random.shuffle(states)
+    forbidden: list[tuple[int, PartialState]] = []
+    for values in states:
+        state = solver.model.packing.pack(values)
+        fresh = Relaxation(solver.model, solver.exclusion, Limits())
+        for action, partial in forbidden:
+            fresh.forbid(action, partial)
+        found = solver.relaxation.estimate(state)
+        assert found == fresh.estimate(state)
+        if found is None:
+            assert forbidden or values not in safe
+        elif found.plan and random.random() < 0.2:
+            action = found.plan[0][0]
+            literal = solver.model.reasons.literal(random.randrange(len(of.variables)), state)
+            forbidden.append((action, literal))
+            solver.relaxation.forbid(action, literal)
+
+
+@examples(amount(150, 5000))
+@given(of=tasks(most_actions=6))
+def test_short_rules_decide_as_the_policy_in_every_state_they_were_told(of: Task) -> None:
+    """Of the tree, as the engine ticks it: the same action, whatever the guards were shortened to."""
+    solver = Solver(of, Limits())
+    solved = solver.run()
+    if not isinstance(solved, Solved):
+        return
+    rules = Rules(solver.model, solver.exclusion, solved, Limits())
+    reachable, _ = strong_cyclic_states(of)
+    rules.meet(map(solver.model.packing.pack, sorted(reachable)))
+    trees = [tree_of(of, solver.model, each) for each in (rules.plain(), rules.short())]
+    ticks = [compile_tick(of, root) for root in trees]
+    starts = [[node.action for node in actions_of(root)] for root in trees]
+    for values in sorted(reachable):
+        plain, short = (tick(values, 0) for tick in ticks)
+        if plain >= STARTED:
+            assert short >= STARTED
+            assert starts[0][plain - STARTED] == starts[1][short - STARTED]
 
 
 def unpacked(packing: Packing, state: int) -> tuple[Truth, ...]:
@@ -379,11 +428,60 @@ def test_a_way_that_may_end_in_a_dead_end_is_not_taken() -> None:
     assert plan(walk(12, bare=(5,))).tree.status == "out-of-reach"
 
 
+SHORT_CUT = """
+(define (domain cut)
+  (:predicates (asleep) (here) (half) (far) (near) (there) (rope) (shoes) (slipped))
+  (:action wake :precondition (asleep) :effect (and (not (asleep)) (here) (oneof {})))
+  (:action walk :precondition (and (here) (not (slipped))) :effect (and (not (here)) (half)))
+  (:action walk-on :precondition (and (half) (not (slipped))) :effect (and (not (half)) (far)))
+  (:action and-on :precondition (and (far) (not (slipped))) :effect (and (not (far)) (near)))
+  (:action arrive :precondition (and (near) (not (slipped))) :effect (and (not (near)) (there)))
+  (:action climb :precondition (and (here) (rope) (not (slipped)))
+    :effect (and (not (rope)) (oneof (and (not (here)) (there)) (slipped))))
+  (:action stand-up :precondition (and (slipped) (shoes)) :effect (and (not (slipped)) (not (here)) (there))))
+(define (problem p) (:domain cut) (:init (asleep)) (:goal (there)))
+"""
+
+
+@pytest.mark.parametrize("order", list(permutations(("(and (rope) (shoes))", "(and)", "(rope)"))))
+def test_a_short_cut_is_no_way_where_one_of_its_outcomes_needs_what_is_missing(order: tuple[str]) -> None:
+    """Whichever state is seen first: with a rope and no shoes the state is like the one with neither in all
+    that walking needs, and the short cut, the first choice where there is a rope, may end without hope."""
+    of = task_of(SHORT_CUT.format(" ".join(order)))
+    done = plan(of)
+    assert done.tree.status == "target-reached"
+    assert simulate(of, done.tree.root, Limits()).success == 1
+
+
 def test_groups_of_exclusive_facts_are_found() -> None:
     of = walk(5)
     solver = Solver(of, Limits())
     names = [[of.variables[variable].name for variable in group] for group in solver.exclusion.groups]
     assert names == [[f"at(p{at})" for at in range(5)]]
+
+
+def calls(of: Task) -> int:
+    """The calls of functions that planning takes."""
+    count = 0
+
+    def note(frame: object, event: str, argument: object) -> None:
+        nonlocal count
+        count += event == "call"
+
+    plan(of)  # so that everything is loaded
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        plan(of)
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+@pytest.mark.parametrize("family", sorted(FAMILIES))
+def test_long_chains_take_work_in_proportion(family: str) -> None:
+    """Four times the rules; trying each rule in each state would take sixteen times the work."""
+    assert calls(FAMILIES[family](121)) <= 7 * calls(FAMILIES[family](31))
 
 
 def test_limits_end_it_and_the_tree_so_far_is_kept() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, TypeVar
@@ -95,9 +95,9 @@ def command(
     sampled = sample(chain, samples, seed, limits) if samples and not recovery else None
     disturbed = _Disturbed(loaded, limits, seed, bool(others))
     if perturb is not None:
-        disturbed.perturb(perturb, runs, max_ticks)
+        disturbed.add(lambda: disturbed.perturb(perturb, runs, max_ticks))
     if recovery:
-        disturbed.recover(samples)
+        disturbed.add(lambda: disturbed.recover(samples))
     if as_json:
         from bbtc.artefacts.figures_json import failing_run_to_json, figures_to_json
         from bbtc.artefacts.jsontext import dumps
@@ -116,7 +116,7 @@ def command(
         lines.extend(failing_lines(loaded, failed, rest))
         lines.extend(_scenario_lines(loaded, listed))
         session.write(output, "".join(f"{printable(line)}\n" for line in lines))
-    for reached in (stop, stop_failing):
+    for reached in (stop, stop_failing, disturbed.stop):
         if reached is not None:
             raise reached
 
@@ -132,7 +132,8 @@ def _tree(session: Session, path: str, others: tuple[str, ...]) -> Tree:
 
 @dataclass
 class _Disturbed:
-    """What was found of the tree in disturbed worlds, for both forms of output."""
+    """What was found of the tree in disturbed worlds, for both forms of output; ``stop`` is the limit that
+    ended the rest of it."""
 
     tree: Tree
     limits: Limits
@@ -140,8 +141,17 @@ class _Disturbed:
     whole: bool
     data: dict[str, object] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
+    stop: LimitReached | None = None
+
+    def add(self, find: Callable[[], None]) -> None:
+        """Find something, as far as the limits allow."""
+        try:
+            find()
+        except LimitReached as reached:
+            self.stop = self.stop or reached
 
     def perturb(self, rate: Fraction, runs: int, most_ticks: int) -> None:
+        """What comes of perturbed runs."""
         from bbtc.artefacts.disturbance_json import perturbed_to_json
         from bbtc.cli.disturbance_report import perturbed_lines
         from bbtc.disturbance.perturbed import perturbed_runs
@@ -154,6 +164,7 @@ class _Disturbed:
         self.lines.extend(perturbed_lines(found))
 
     def recover(self, samples: int | None) -> None:
+        """What the tree attains from any state."""
         from bbtc.artefacts.disturbance_json import recovery_to_json
         from bbtc.cli.disturbance_report import recovery_lines
         from bbtc.disturbance.recovery import recovery

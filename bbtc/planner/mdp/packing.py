@@ -23,6 +23,8 @@ Words: TypeAlias = "npt.NDArray[np.uint64]"
 """Packed states, a row each."""
 Flags: TypeAlias = "npt.NDArray[np.bool_]"
 
+_TRUE_AS_ONE = bytes(ord("1") if value == Truth.TRUE else ord("0") for value in range(256))
+
 
 @dataclass(frozen=True, slots=True)
 class Cube:
@@ -77,9 +79,10 @@ class Packing:
 
     def pack(self, values: Values) -> int:
         """The bits of a state."""
-        packed = 0
-        for variable, value in enumerate(values):
-            packed |= self.assigned(variable, value)
+        packed = int(values[::-1].translate(_TRUE_AS_ONE) or b"0", 2)
+        for variable in self._three_valued:
+            if values[variable] == Truth.UNKNOWN:
+                packed |= self.assigned(variable, Truth.UNKNOWN)
         return packed
 
     def split(self, packed: Iterable[int]) -> Words:

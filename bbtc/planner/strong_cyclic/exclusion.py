@@ -102,7 +102,7 @@ class Exclusion:
                 key = 2 * bit + (partial.value >> bit & 1)
                 if key not in way_of:
                     only = PartialState(1 << bit, partial.value & 1 << bit)
-                    literal = self._strongest(reasons.differs(only, state), state)
+                    literal = self.strongest(reasons.differs(only, state), state)
                     way_of[key] = number.setdefault(literal, len(ways))
                     if way_of[key] == len(ways):
                         ways.append(literal)
@@ -126,7 +126,7 @@ class Exclusion:
             waiting = rest
         return known
 
-    def _strongest(self, literal: PartialState, state: int) -> PartialState:
+    def strongest(self, literal: PartialState, state: int) -> PartialState:
         """What implies a literal of a state: that another member of its group is true."""
         variable = literal.mask.bit_length() - 1
         if not literal.value and variable in self.mates:

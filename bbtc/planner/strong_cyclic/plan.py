@@ -30,6 +30,9 @@ matters."""
 _FOR_SURE = 0.6
 """Of the time left, what may be spent on the search for a policy that surely reaches the goal."""
 
+_MOST_SHORT = 6
+"""How many short trees are tried; each decides as the policy in the states that those before it met."""
+
 _FOR_SHORT = 0.6
 """Of the time left, what may be spent on the short tree while there is none."""
 
@@ -87,30 +90,40 @@ class _Advice:
 
 
 def _keep(best: BestTree, solver: Solver, solved: Solved, limits: Limits) -> None:
-    """A tree of the policy that is shown to succeed always: the short one, else the plain one."""
+    """A tree of the policy that is shown to succeed always: a short one, else the plain one."""
     rules = Rules(solver.model, solver.exclusion, solved, limits)
     try:
-        if _keep_if_sure(best, solver, rules.short(), limits.part(_FOR_SHORT)):
-            return
+        for _ in range(_MOST_SHORT):
+            chain = _keep_if_sure(best, solver, solved, rules.short(), limits.part(_FOR_SHORT))
+            if chain is None:
+                return
+            if not rules.meet(solver.model.packing.pack(state.values) for state in chain.states):
+                break
     except LimitReached:
         limits.check_time("the search for a small tree")
-    _keep_if_sure(best, solver, rules.plain(), limits)
+    _keep_if_sure(best, solver, solved, rules.plain(), limits)
 
 
-def _keep_if_sure(best: BestTree, solver: Solver, rules: Sequence[Rule], limits: Limits) -> bool:
+def _keep_if_sure(
+    best: BestTree, solver: Solver, solved: Solved, rules: Sequence[Rule], limits: Limits
+) -> Chain | None:
+    """Keep a tree that succeeds always; of another one, return the chain."""
     root = tree_of(solver.task, solver.model, rules)
     limits.check_nodes(size(root))
-    chain = chain_of(solver, root, limits)
+    chain = chain_of(solver, solved, root, limits)
     success = success_of(chain)
-    if success == 1:
-        best.take(root, chain, success)
-    return success == 1
+    if success < 1:
+        return chain
+    best.take(root, chain, success)
+    return None
 
 
-def chain_of(solver: Solver, root: Node, limits: Limits) -> Chain:
+def chain_of(solver: Solver, solved: Solved, root: Node, limits: Limits) -> Chain:
     """The chain of a tree, or where it is large, its quotient."""
-    try:
-        return explore(solver.task, root, replace(limits, states=min(limits.states, _FEW_STATES)))
-    except LimitReached:
-        limits.check_time("the simulation")
+    few = min(limits.states, _FEW_STATES)
+    if len(solved.visited) <= few:  # the tree gets to all that the policy visits, and maybe more
+        try:
+            return explore(solver.task, root, replace(limits, states=few))
+        except LimitReached:
+            limits.check_time("the simulation")
     return quotient_chain(solver.task, root, limits, solver.model, solver.exclusion)

@@ -19,10 +19,11 @@ from typing_extensions import assert_never
 from bbtc.belief.chain import Chain, Edge
 from bbtc.belief.state import State, Values, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus
-from bbtc.ground.condition import Condition
+from bbtc.ground.condition import Condition, variables
 from bbtc.ground.task import Task, charges_of
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.planner.mdp.packing import bit_test
+from bbtc.planner.mdp.packing import All, Cube, bit_test, set_bits
 from bbtc.planner.strong_cyclic.determinised import Determinised, Step
 from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, satisfied, united
@@ -74,10 +75,17 @@ def quotient_chain(
 
 
 def _values(unknown: tuple[int | None, ...], state: int) -> Values:
-    return bytes(
-        1 if at is not None and state >> at & 1 else 2 * (state >> variable & 1)
-        for variable, at in enumerate(unknown)
-    )
+    true = format(state & (1 << len(unknown)) - 1, f"0{len(unknown)}b")[::-1] if unknown else ""
+    values = bytearray(true.encode().translate(_ONE_AS_TRUE))
+    for variable, at in enumerate(unknown):
+        if at is not None and state >> at & 1:
+            values[variable] = Truth.UNKNOWN
+    return bytes(values)
+
+
+_ONE_AS_TRUE = bytes(int(Truth.TRUE) if digit == ord("1") else int(Truth.FALSE) for digit in range(256))
+_MANY_CHILDREN = 8  # of a fallback, from which on an index pays
+_MOST_FALSE = 2  # members of a group that are noted to be false one by one
 
 
 class _Known:
@@ -93,6 +101,13 @@ class _Known:
         if partial.mask & ~self.closed.mask:
             self.read = united(self.read, partial)
             self.closed = self._exclusion.closed(self.read)
+
+    def note_first_of_group(self, literal: PartialState, state: int) -> None:
+        """Note a literal; where it is one more of a group that is false, what is true of it instead."""
+        mates = self._exclusion.mates.get(literal.mask.bit_length() - 1, 0)
+        if not literal.value and (mates & self.read.mask).bit_count() >= _MOST_FALSE:
+            literal = self._exclusion.strongest(literal, state)
+        self.note(literal)
 
 
 _Tick: TypeAlias = Callable[[int, _Known], int]
@@ -174,9 +189,11 @@ class _Ticks:
 
                 return guarded
             case ControlNode():
-                children = [self._compiled(child) for child in node.children]
                 if node.kind == "retry":
                     raise ValueError("a tree that remembers what it did")
+                children = [self._compiled(child) for child in node.children]
+                if node.kind == "fallback" and len(children) >= _MANY_CHILDREN:
+                    return self._of_many(children, [self._needed(child) for child in node.children])
                 go_on = {
                     "sequence": NodeStatus.SUCCESS,
                     "fallback": NodeStatus.FAILURE,
@@ -194,9 +211,71 @@ class _Ticks:
             case _:
                 assert_never(node)
 
+    def _needed(self, node: Node) -> int:
+        """Bits of which each must be true for a node not to fail."""
+        found = 0
+        parts = node.children if isinstance(node, ControlNode) and node.kind == "sequence" else (node,)
+        for part in parts:
+            match part:
+                case ConditionNode():
+                    condition = part.condition
+                case ActionNode() if part.guarded:
+                    condition = self.task.action_by_name[part.action].precondition
+                case _:
+                    break
+            if any(self.task.variables[variable].three_valued for variable in variables(condition)):
+                break
+            test = bit_test(self.model.packing, condition)
+            for cube in test.parts if isinstance(test, All) else (test,):
+                if isinstance(cube, Cube):
+                    found |= cube.value
+        return found
+
+    def _of_many(self, children: list[_Tick], needed: list[int]) -> _Tick:
+        """A fallback; children that fail by what was read already are passed over."""
+        users: dict[int, int] = {}
+        for number, bits in enumerate(needed):
+            for bit in set_bits(bits):
+                users[bit] = users.get(bit, 0) | 1 << number
+        watched = sum(1 << bit for bit in users)
+        ruled_out = dict.fromkeys(self.exclusion.mates, 0)
+        for group in self.exclusion.groups:
+            all_users = 0
+            for member in group:
+                all_users |= users.get(member, 0)
+            for member in group:
+                ruled_out[member] |= all_users & ~users.get(member, 0)
+
+        def fallback(state: int, known: _Known) -> int:
+            left, true, false = (1 << len(children)) - 1, 0, 0
+            while left:
+                read = known.read
+                new = read.value & self.exclusion.members & ~true
+                for bit in set_bits(new):
+                    left &= ~ruled_out[bit]
+                true |= new
+                new = read.mask & ~read.value & watched & ~false
+                for bit in set_bits(new):
+                    left &= ~users[bit]
+                false |= new
+                if not left:
+                    break
+                lowest = left & -left
+                left ^= lowest
+                status = children[lowest.bit_length() - 1](state, known)
+                if status != NodeStatus.FAILURE:
+                    return status
+            return int(NodeStatus.FAILURE)
+
+        return fallback
+
     def _condition(self, condition: Condition) -> _Tick:
         packing, reasons = self.model.packing, self.model.reasons
         true, false = bit_test(packing, condition), bit_test(packing, condition, False)
+        if isinstance(true, Cube) and not any(
+            packing.unknown[packing.owner(bit)] is not None for bit in set_bits(true.mask)
+        ):
+            return self._conjunction(true)
 
         def read(state: int, known: _Known) -> int:
             closed = known.closed
@@ -209,5 +288,20 @@ class _Ticks:
             known.note(reasons.why_not(true, state, closed.mask))
             known.note(reasons.why_not(false, state, known.closed.mask))
             return int(NodeStatus.RUNNING)
+
+        return read
+
+    def _conjunction(self, cube: Cube) -> _Tick:
+        """Of literals that are never unknown, the most common condition by far."""
+        reasons, mask, value = self.model.reasons, cube.mask, cube.value
+
+        def read(state: int, known: _Known) -> int:
+            wrong = (state ^ value) & mask
+            if not wrong:
+                known.note(cube)
+                return int(NodeStatus.SUCCESS)
+            if not wrong & known.closed.mask:
+                known.note_first_of_group(reasons.differs(cube, state), state)
+            return int(NodeStatus.FAILURE)
 
         return read

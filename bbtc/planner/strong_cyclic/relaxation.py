@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from heapq import heappop, heappush
+from heapq import heapify, heappop, heappush
 
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import ALWAYS, BitTest, cubes, set_bits
-from bbtc.planner.strong_cyclic.determinised import Determinised
+from bbtc.planner.strong_cyclic.determinised import Determinised, Step
 from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, literals, united, without
 
@@ -28,10 +28,12 @@ _OPERATORS_AT_ONCE = 1024  # between two looks at the limits
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """``steps`` of a relaxed plan, and the actions of it that may start at once."""
+    """``steps`` of a relaxed plan, the actions of it that may start at once, and all of it: actions with the
+    outcomes wanted, those that need least first."""
 
     steps: int
     helpful: tuple[int, ...]
+    plan: tuple[tuple[int, Step], ...]
 
 
 class Relaxation:
@@ -56,22 +58,21 @@ class Relaxation:
         self._action: list[int] = []
         self._needs: list[tuple[int, ...]] = []
         self._adds: list[tuple[int, ...]] = []
+        self._steps: list[dict[int, Step]] = []
         known = {3 + 4 * v for v, at in enumerate(self.packing.unknown) if at is not None}
-        made: dict[tuple[tuple[int, ...], tuple[int, ...], int], None] = {}
-        for needs in self._facts_of(self.model.goal, ANY_STATE):
-            made[needs, (self.goal,), -1] = None
+        made: dict[tuple[tuple[int, ...], int], dict[int, Step]] = {}
         for action in self.model.actions:
             if action.number % _OPERATORS_AT_ONCE == 0:
                 self.limits.check_time("planning")
             disjuncts = (ANY_STATE,) if action.needs is None else action.needs
             for need in disjuncts:
-                for step in action.steps:
+                for step in sorted(action.steps, key=_changes):
                     for when, sets in [(part.when, part.sets) for part in step.guarded] or [
                         (ALWAYS, step.sets)
                     ]:
-                        adds = tuple(self._added(sets, known))
+                        adds = dict.fromkeys(self._added(sets, known), step)
                         for needs in self._facts_of(when, need):
-                            made[needs, adds, action.number] = None
+                            made[needs, action.number] = adds | made.get((needs, action.number), {})
         self._users: list[list[int]] = [[] for _ in range(self.count)]
         self._counts: list[int] = []
         self._operators: dict[int, list[int]] = {}
@@ -79,13 +80,24 @@ class Relaxation:
         self._wanted = bytearray(self.count)
         self._masks = [0, 0, 0, 0]
         self._choices: dict[tuple[int, ...], int] = {}
-        for needs, adds, number in made:
-            self._operate(needs, adds, number)
+        self._at: int | None = None
+        self._ready: set[int] = set()
+        self._left: list[int] = []
+        self._cost: list[int] = []
+        for needs in self._facts_of(self.model.goal, ANY_STATE):
+            self._operate(needs, (self.goal,), -1, {})
+        for (needs, number), steps in made.items():
+            self._operate(needs, tuple([fact for fact in steps if fact not in needs]), number, steps)
         self._want(self.goal)
 
-    def _operate(self, needs: tuple[int, ...], adds: tuple[int, ...], action: int) -> None:
-        """One more operator; what it adds counts where something needs it."""
+    def _operate(
+        self, needs: tuple[int, ...], adds: tuple[int, ...], action: int, steps: dict[int, Step]
+    ) -> None:
+        """One more operator, for all steps of an action with the same needs: which of them adds a fact is
+        told by ``steps``. What it adds counts where something needs it."""
+        self._at = None
         operator = len(self._needs)
+        self._steps.append(steps)
         self._needs.append(needs)
         self._counts.append(len(needs))
         self._action.append(action)
@@ -133,6 +145,7 @@ class Relaxation:
 
     def forbid(self, action: int, partial: PartialState) -> None:
         """The action must not start where something holds: one of its literals must not hold."""
+        self._at = None
         if not partial.mask:
             for operator in self._operators.pop(action, ()):
                 self._counts[operator] += 1  # which nothing counts down
@@ -164,7 +177,7 @@ class Relaxation:
             self._users.append([])
             self._wanted.append(1)
             for way in ways:
-                self._operate((way,), (known,), -1)
+                self._operate((way,), (known,), -1, {})
         return known
 
     def holding(self, state: int) -> list[int]:
@@ -185,26 +198,66 @@ class Relaxation:
 
     # --- the heuristic ----------------------------------------------------------------------------
 
+    def _go_to(self, state: int) -> None:
+        """Make a state the one that costs are counted from: ``_cost`` of its facts is 0, ``_left`` are the
+        facts that operators need besides, and ``_ready`` the operators that need none."""
+        if self._at is None:
+            self._cost, self._left = [_NEVER] * self.count, self._counts.copy()
+            self._ready = set()
+            self._gain([*self.holding(state), self._always])
+        elif self._at != state:
+            changed = {self.packing.owner(bit) for bit in set_bits(self._at ^ state)}
+            before = [fact for variable in changed for fact in self._facts_in(self._at, variable)]
+            after = [fact for variable in changed for fact in self._facts_in(state, variable)]
+            for fact in before:
+                self._cost[fact] = _NEVER
+                for operator in self._users[fact]:
+                    if not self._left[operator]:
+                        self._ready.remove(operator)
+                    self._left[operator] += 1
+            self._gain(after)
+        self._at = state
+
+    def _gain(self, facts: Iterable[int]) -> None:
+        for fact in facts:
+            self._cost[fact] = 0
+            for operator in self._users[fact]:
+                self._left[operator] -= 1
+                if not self._left[operator]:
+                    self._ready.add(operator)
+
+    def _facts_in(self, state: int, variable: int) -> tuple[int, ...]:
+        """The facts of one variable in a state."""
+        at = self.packing.unknown[variable]
+        if at is not None and state >> at & 1:
+            return (4 * variable + 1,)
+        value = 4 * variable + (2 if state >> variable & 1 else 0)
+        return (value,) if at is None else (value, 4 * variable + 3)
+
     def estimate(self, state: int) -> Estimate | None:
         """A guess of the steps to the goal; None if it is out of reach, even in the relaxation."""
-        cost = [_NEVER] * self.count
-        by = [-1] * self.count
-        left = self._counts.copy()
-        total = [0] * len(left)
-        queue: list[int] = []
-        size = self.count
-        holding = [*self.holding(state), self._always]
-        for fact in holding:
-            cost[fact] = 0
-            queue.append(fact)
+        self._go_to(state)
         users, adds, actions, goal = self._users, self._adds, self._action, self.goal
+        cost, left = self._cost.copy(), self._left.copy()
+        by = [-1] * self.count
+        total = [0] * len(left)
+        size = self.count
+        queue: list[int] = []
+        for operator in sorted(self._ready):
+            price = int(actions[operator] >= 0)
+            for added in adds[operator]:
+                if price < cost[added]:
+                    cost[added] = price
+                    by[added] = operator
+                    queue.append(price * size + added)
+        heapify(queue)
         while queue:
             entry = heappop(queue)
             spent, fact = divmod(entry, size)
             if spent > cost[fact]:
                 continue
             if fact == goal:
-                return self._relaxed_plan(by, cost)
+                return self._relaxed_plan(by, total)
             for operator in users[fact]:
                 left[operator] -= 1
                 total[operator] += spent
@@ -217,26 +270,25 @@ class Relaxation:
                             heappush(queue, price * size + added)
         return None
 
-    def _relaxed_plan(self, by: list[int], cost: list[int]) -> Estimate:
-        chosen: set[tuple[int, tuple[int, ...]]] = set()
-        helpful: set[int] = set()
+    def _relaxed_plan(self, by: list[int], total: list[int]) -> Estimate:
+        chosen: dict[int, dict[Step, None]] = {}
         seen = {self.goal}
         stack = [self.goal]
         while stack:
-            operator = by[stack.pop()]
+            reached = stack.pop()
+            operator = by[reached]
             if operator < 0:
                 continue
-            needs = self._needs[operator]
-            action = self._action[operator]
-            if action >= 0:
-                chosen.add((action, needs))
-                if all(cost[fact] == 0 for fact in needs):
-                    helpful.add(action)
-            for fact in needs:
+            if self._action[operator] >= 0:
+                chosen.setdefault(operator, {})[self._steps[operator][reached]] = None
+            for fact in self._needs[operator]:
                 if fact not in seen:
                     seen.add(fact)
                     stack.append(fact)
-        return Estimate(len(chosen), tuple(sorted(helpful)))
+        operators = sorted(chosen, key=lambda operator: (total[operator], operator))
+        helpful = {self._action[operator] for operator in operators if not total[operator]}
+        plan = [(self._action[operator], step) for operator in operators for step in chosen[operator]]
+        return Estimate(len(operators), tuple(sorted(helpful)), tuple(plan))
 
     # --- dead ends ----------------------------------------------------------------------------------
 
@@ -248,16 +300,25 @@ class Relaxation:
         kept = self.exclusion.shortest(PartialState(self._full, state & self._full))
         # What would be true without them, and makes no difference.
         kept = without(kept, ~state & self._two_valued & ~self._masks[2])
-        for literal in sorted(literals(self.packing, kept), key=lambda each: each.value != 0):
+        free, simple = 0, kept.mask & self._two_valued & ~(kept.value & self.exclusion.members)
+        for bit in set_bits(simple):
+            if reach.add((4 * bit, 4 * bit + 2)):
+                free |= 1 << bit
+        rest, kept = without(kept, simple), without(kept, free)
+        for literal in sorted(literals(self.packing, rest), key=lambda each: each.value != 0):
             kept = self._freed(reach, kept, literal)
         return kept
+
+    def _set_free(self, literals: PartialState, rest: PartialState) -> int:
+        """The variables that may be true once some literals do not hold, which excluded them."""
+        if not literals.value & self.exclusion.members:
+            return 0
+        return self.exclusion.implied(literals) & ~self.exclusion.implied(rest) & ~rest.mask
 
     def _freed(self, reach: _Reach, kept: PartialState, literal: PartialState) -> PartialState:
         """A partial state without a literal of it, if the goal stays out of reach."""
         rest = without(kept, literal.mask)
-        mates = 0
-        if literal.value & self.exclusion.members:
-            mates = self.exclusion.implied(literal) & ~self.exclusion.implied(rest) & ~rest.mask
+        mates = self._set_free(literal, rest)
         facts = self._other_facts(literal.mask)
         if reach.add([*facts, *self._other_facts(mates)]):
             return rest
@@ -282,6 +343,11 @@ class Relaxation:
         return found
 
 
+def _changes(step: Step) -> int:
+    """How much a step sets: of those that add a fact, the one with the fewest side effects is wanted."""
+    return sum(len(part.sets) for part in step.guarded) or len(step.sets)
+
+
 class _Reach:
     """What is reached in the relaxation, growing as long as the goal is not."""
 
@@ -294,11 +360,12 @@ class _Reach:
 
     def add(self, facts: Iterable[int]) -> bool:
         """Add facts and what follows; unless the goal would be reached: then nothing changes."""
-        new: list[int] = []
-        for fact in facts:
-            if not self.reached[fact]:
-                self.reached[fact] = 1
-                new.append(fact)
+        reached = self.reached
+        new = [fact for fact in facts if not reached[fact]]
+        if not new:
+            return True
+        for fact in new:
+            reached[fact] = 1
         used = 0
         for fact in new:  # grows while it is read
             if fact == self.goal:

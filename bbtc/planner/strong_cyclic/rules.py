@@ -8,7 +8,7 @@ read as false then.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from bbtc.ground.condition import (
@@ -71,31 +71,56 @@ class Rules:
 
     def __init__(self, model: Determinised, exclusion: Exclusion, solved: Solved, limits: Limits) -> None:
         self.model, self.exclusion, self.solved, self.limits = model, exclusion, solved, limits
+        self._plain = self._merged(self.plain())
+        self._actions: dict[int, int] = {}
+        """The action of each state met that is not in the goal, -1 where no rule applies."""
+        self._of_action: dict[int, list[int]] = {}
+        for number, rule in enumerate(self._plain):
+            self._of_action.setdefault(rule.action, []).append(number)
+        self._able: dict[int, list[int]] = {}
+        """The states met, and decided, in which each action may start."""
+        self.meet(solved.visited)
+
+    def meet(self, states: Iterable[int]) -> bool:
+        """From now on, short rules decide as plain ones in these states, too; False if they did so before."""
+        new = [s for s in states if s not in self._actions and not satisfied(self.model.goal, s)]
+        for state in new:
+            able = self.model.applicable(state)
+            numbers = sorted(number for action in able for number in self._of_action.get(action, ()))
+            first = next((number for number in numbers if self._holds(self._plain[number], state)), None)
+            self._actions[state] = -1 if first is None else self._plain[first].action
+            if first is not None:
+                for action in able:
+                    self._able.setdefault(action, []).append(state)
+        return bool(new)
 
     def plain(self) -> list[Rule]:
         """A rule for each pair, with all that the rest of the plan needs."""
         return [Rule((self._guard(pair.partial, pair.action),), pair.action) for pair in self.solved.pairs]
 
     def short(self) -> list[Rule]:
-        """Rules that decide alike in all states that were visited, with less in their guards, fewer of
-        them."""
-        rules = self._merged(self.plain())
-        undecided = [state for state in self.solved.visited if not satisfied(self.model.goal, state)]
+        """Rules that decide alike in all states met, with less in their guards, fewer of them."""
+        actions = self._actions
+        left = {state for state, action in actions.items() if action >= 0}
         found: list[Rule] = []
-        actions = self._decisions(rules, undecided)
-        for number, rule in enumerate(rules):
+        for rule in self._plain:
             self.limits.check_time("the search for a small tree")
-            guards = list(rule.guards)
-            test = self.model.actions[rule.action].test
-            others = [
-                state for state in undecided if actions[state] != rule.action and satisfied(test, state)
-            ]
-            for at, guard in enumerate(guards):
-                guards[at] = self._shorter(guard, others)
+            able = [state for state in self._able.get(rule.action, ()) if state in left]
+            others = [state for state in able if actions[state] != rule.action]
+            waiting = [state for state in able if actions[state] == rule.action]
+            guards: list[Guard] = []
+            for long in rule.guards:
+                if not any(long.holds(state) for state in waiting):
+                    continue  # those before it, with less in them, decide all that it does
+                guard = self._shorter(long, others)
+                guards.append(guard)
+                waiting = [state for state in waiting if not guard.holds(state)]
+            if not guards:
+                continue
             short = Rule(tuple(guards), rule.action)
             found.append(short)
-            undecided = [state for state in undecided if not self._applies(short, state)]
-            if not undecided and number < len(rules):
+            left.difference_update([state for state in able if self._holds(short, state)])
+            if not left:
                 break  # the rest decides nothing that is met
         return self._merged(found)
 
@@ -133,16 +158,10 @@ class Rules:
                 return PartialState(partial.mask, partial.mask & ~partial.value)
         return None
 
-    def _decisions(self, rules: Sequence[Rule], states: Sequence[int]) -> dict[int, int]:
-        """The action of each state, -1 where no rule applies."""
-        return {
-            state: next((rule.action for rule in rules if self._applies(rule, state)), -1) for state in states
-        }
-
-    def _applies(self, rule: Rule, state: int) -> bool:
-        return satisfied(self.model.actions[rule.action].test, state) and any(
-            guard.holds(state) for guard in rule.guards
-        )
+    @staticmethod
+    def _holds(rule: Rule, state: int) -> bool:
+        """Does a rule apply in a state in which its action may start?"""
+        return any(guard.holds(state) for guard in rule.guards)
 
     def _shorter(self, guard: Guard, others: list[int]) -> Guard:
         """Without what is not needed to hold in none of some states."""
@@ -185,7 +204,11 @@ class Rules:
 
 
 def _apart(one: Sequence[PartialState], other: Sequence[PartialState]) -> bool:
-    return all(contradict(own, its) for own in one for its in other)
+    for own in one:
+        for its in other:
+            if not contradict(own, its):
+                return False
+    return True
 
 
 def _joined(guards: Sequence[Guard]) -> tuple[Guard, ...]:

@@ -17,6 +17,8 @@ from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, united
 from bbtc.planner.strong_cyclic.policy import Covers
 
+_STATES_AT_ONCE = 16  # between two looks at the time
+
 
 class Decisions(Protocol):
     """What to do in each state, and why."""
@@ -127,7 +129,8 @@ class Visit:
     def _enter(self, state: int) -> Node:
         limits = self.decisions.limits
         limits.check_states(len(self.nodes), "the search for a policy")
-        limits.check_time("the search for a policy", len(self.nodes))
+        if len(self.nodes) % _STATES_AT_ONCE == 0:
+            limits.check_time("the search for a policy", len(self.nodes))
         node = self.nodes[state] = Node(state, len(self.nodes), len(self.nodes))
         self._stack.append(node)
         node.why = node.why_final = self.decisions.final(state)

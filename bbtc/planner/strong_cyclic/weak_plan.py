@@ -16,6 +16,7 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.limits import Limits
 from bbtc.planner.strong_cyclic.determinised import Determinised, Step
+from bbtc.planner.strong_cyclic.partial_state import satisfied
 from bbtc.planner.strong_cyclic.policy import Forbidden
 from bbtc.planner.strong_cyclic.relaxation import Estimate, Relaxation
 
@@ -23,6 +24,7 @@ _HELPFUL, _NOVEL, _ALL = 1, 2, 0
 _QUEUES = (_HELPFUL, _NOVEL, _ALL)  # in this order where their priorities are equal
 _BOOST = 1000  # expansions that helpful actions are preferred for after progress
 _STALLED = 250  # expansions without progress, after which the third queue is used, too
+_SHORT_WAY = 2  # steps of a relaxed plan that are worth following; single ones are tried anyway
 _LOOK = 64  # evaluations between two looks at the limits
 
 
@@ -89,12 +91,17 @@ class Searcher:
     ) -> WeakPlan | Exhausted:
         """A plan from a state to one that has ``arrived``, by steps that are not forbidden. ``on_dead_end``
         is told every dead end of the relaxation, and the step that led to it."""
+        at_once = self._at_once(start, arrived)
+        if at_once is not None:
+            return at_once
         parent: dict[int, Taken | None] = {start: None}
         depth = {start: 0}
         frontier = _Frontier(start)
         dead: dict[int, None] = {}
+        ahead: int | None = None
         while frontier:
-            state = frontier.pop()
+            state = frontier.pop() if ahead is None else ahead
+            ahead = None
             if state in frontier.expanded or state in dead:
                 continue
             found = self.estimate(state)
@@ -119,7 +126,54 @@ class Searcher:
                     if arrived(after):
                         return _traced(parent, after)
                     frontier.push(after, (found.steps, depth[after]), number in helpful, novel)
+            for taken, after in self._followed(state, found, arrived) if frontier.progress else ():
+                ahead = after
+                if after not in parent:
+                    parent[after], depth[after] = taken, depth[taken.state] + 1
+                    frontier.push(after, (found.steps, depth[after]), True, novel)
+            if ahead is not None and arrived(ahead):
+                return _traced(parent, ahead)
         return Exhausted(tuple(frontier.expanded), tuple(dead))
+
+    def _at_once(self, start: int, arrived: Callable[[int], bool]) -> WeakPlan | None:
+        """A plan of one step, for which no distance need be known."""
+        for number in self.model.applicable(start):
+            for step in self.model.actions[number].steps:
+                after = step.apply(start)
+                if after != start and arrived(after) and self.forbidden.forbids(start, number) is None:
+                    return WeakPlan((Taken(start, number, step),), after)
+        return None
+
+    def _followed(
+        self, start: int, found: Estimate, arrived: Callable[[int], bool]
+    ) -> list[tuple[Taken, int]]:
+        """The steps of a relaxed plan, as far as they can be taken one after the other, and where they lead,
+        if that is as much closer to the goal as there are steps. Idea: Vidal, "A lookahead strategy for
+        heuristic search planning" (2004), without the repair of plans."""
+        way: list[tuple[Taken, int]] = []
+        state, seen, left = start, {start}, found.plan
+        count = -1
+        while len(left) != count:
+            count, rest = len(left), []
+            for number, step in left:
+                after = step.apply(state)
+                if (
+                    after in seen
+                    or not satisfied(self.model.actions[number].test, state)
+                    or self.forbidden.forbids(state, number) is not None
+                ):
+                    rest.append((number, step))
+                    continue
+                way.append((Taken(state, number, step), after))
+                state = after
+                seen.add(state)
+                if arrived(state):
+                    return way
+            left = tuple(rest)
+        if len(way) < _SHORT_WAY:
+            return []
+        ahead = self.estimate(state)
+        return [] if ahead is None or ahead.steps + len(way) > found.steps else way
 
 
 class _Frontier:
@@ -134,6 +188,8 @@ class _Frontier:
         self._count = 0
         self._best: int | None = None
         self._progress = 0
+        self.progress = False
+        """Is the state expanded last closer to the goal than all before?"""
         self._seen: dict[int, int] = {}
 
     def __bool__(self) -> bool:
@@ -152,7 +208,8 @@ class _Frontier:
     def expand(self, state: int, steps: int) -> bool:
         """A state is expanded; is something true in it that was not in others as far from the goal?"""
         self.expanded[state] = None
-        if self._best is None or steps < self._best:
+        self.progress = self._best is None or steps < self._best
+        if self.progress:
             if self._best is not None:
                 self._priority[_HELPFUL] -= _BOOST
             self._best, self._progress = steps, len(self.expanded)

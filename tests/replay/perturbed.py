@@ -73,7 +73,7 @@ class PerturbedWorld:
         """The value of a variable, by name."""
         return self.values[self._task.variable_index[variable]]
 
-    def start(self, action: str, runner: Hashable) -> bool:  # noqa: ARG002 - it never goes on
+    def start(self, action: str, runner: Hashable) -> bool:
         """An action starts, and ends at once."""
         results = self._actions[action](self.values)
         result = results[Draw(each.probability for each in results)(self._bits())]
@@ -84,15 +84,15 @@ class PerturbedWorld:
         self.values = result.values
         return True
 
-    def running(self, runner: Hashable) -> bool:  # noqa: ARG002
+    def running(self, runner: Hashable) -> bool:
         """No action runs on."""
         return False
 
-    def go_on(self, runner: Hashable) -> bool:  # noqa: ARG002
+    def go_on(self, runner: Hashable) -> bool:
         """No action runs on."""
         raise AssertionError("an action is called again that has ended")
 
-    def cancel(self, runner: Hashable) -> None:  # noqa: ARG002
+    def cancel(self, runner: Hashable) -> None:
         """No action runs on."""
         raise AssertionError("an action is cancelled that has ended")
 
