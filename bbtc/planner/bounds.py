@@ -66,7 +66,7 @@ def _without_end(task: Task, limits: Limits, *, costs: bool, target: Fraction | 
     from bbtc.planner.mdp.solve import best_known
     from bbtc.planner.mdp.ssp import least_cost
 
-    best = best_known(task, limits, target)
+    best = best_known(task, limits, target, costs=costs, verdict=True)
     cost, stop = None, best.stop
     if costs and best.space.complete:
         try:

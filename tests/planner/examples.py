@@ -80,4 +80,7 @@ def public(folder: str, problem: str) -> Optimum:
     corpus = corpus_folder()
     if corpus is None:
         pytest.skip("no corpus: set BBTC_CORPUS, or put it at ../shared/corpus")
-    return Optimum((corpus / folder / "domain.pddl", corpus / folder / f"{problem}.pddl"), -1, ())
+    domain = corpus / folder / "domain.pddl"
+    if not domain.is_file():  # each problem has its own
+        domain = corpus / folder / f"{problem.replace('problem', 'domain')}.pddl"
+    return Optimum((domain, corpus / folder / f"{problem}.pddl"), -1, ())

@@ -25,6 +25,8 @@ from bbtc.ground.task import InitialState, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.packing import Packing
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
@@ -64,6 +66,8 @@ def test_random_tasks_have_a_policy_where_enumeration_finds_one(of: Task) -> Non
         assert simulate(of, done.tree.root, Limits()).success == 1
     else:
         assert done.tree.status == "out-of-reach"
+        best = max_prob(explore_space(of, Limits()), Limits()).initial.exact
+        assert done.tree.success_probability == best, "the best policy is written all the same"
 
 
 @examples(amount(300, 5000))

@@ -4,17 +4,20 @@ that expands only what matters."""
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.planner.mdp.bounded_search import search_bounds
+from bbtc.planner.mdp.bounded_search import Advice, search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.state_space import StateSpace
+
+FEW_STATES = 100_000
+"""A space with no more is explored as a whole."""
 
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space
 _BEFORE_VALUES = 1 / 2  # of the time, for exploration within a number of actions
@@ -37,14 +40,26 @@ class Best:
         return self.found.space
 
 
-def best_known(task: Task, limits: Limits, target: Fraction | None = None, *, whole: bool = False) -> Best:
-    """Bounds on P* that meet if the limits allow it. With a ``target``, where the whole space is too
-    large, they need only tell whether it can be reached.
+def best_known(
+    task: Task,
+    limits: Limits,
+    target: Fraction | None = None,
+    *,
+    whole: bool = False,
+    costs: bool = False,
+    verdict: bool = False,
+    advice: Advice | None = None,
+) -> Best:
+    """Bounds on P* that meet if the limits allow it. With a ``target``, where the space is too large to be
+    explored, a policy that reaches it is enough; with ``verdict``, to know whether there is one. ``costs``
+    asks for the whole space, if the limits allow it, so that the least cost can be told. ``advice`` is what
+    a search follows first.
 
     Raises ``LimitReached`` only if the time is over before anything was found, or with ``whole`` if
     the limits do not allow to explore the whole space.
     """
-    space = explore_space(task, limits if whole else limits.part(_SHARE))
+    few = limits if whole or costs else replace(limits, states=min(limits.states, FEW_STATES))
+    space = explore_space(task, few if whole else few.part(_SHARE))
     if space.complete:
         found = max_prob(space, limits)
         return Best(found, found.initial)
@@ -52,7 +67,7 @@ def best_known(task: Task, limits: Limits, target: Fraction | None = None, *, wh
         assert space.stop is not None
         raise LimitReached([space.stop])
     del space  # two of them may be too much
-    searched = search_bounds(task, limits, target)
+    searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
     return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
 
 

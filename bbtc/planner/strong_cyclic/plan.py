@@ -1,5 +1,6 @@
 """The strategy ``strong-cyclic``: a policy over partial states that reaches the goal with probability 1,
-written down as rules; where there is none, it says so."""
+written down as rules; where there is none, or a limit ends the search for it, the best policy that the search
+for P* finds, to which it tells what it learnt."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from fractions import Fraction
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import success_of
-from bbtc.diagnostics import Diagnostic, LimitReached
+from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
@@ -18,6 +19,7 @@ from bbtc.planner.result import Plan, Progress
 from bbtc.planner.strong_cyclic.quotient import quotient_chain
 from bbtc.planner.strong_cyclic.rules import Rule, Rules, tree_of
 from bbtc.planner.strong_cyclic.solve import Hopeless, Solved, Solver
+from bbtc.planner.synthesis.policy import plan_policy
 from bbtc.rewrite.simplify import numbered, size
 from bbtc.tree.nodes import ConditionNode, Node, PlanStatus
 
@@ -28,6 +30,9 @@ matters."""
 _MOST_SHORT = 6
 """How many short trees are tried; each decides as the policy in the states that those before it met."""
 
+_FOR_SURE = 0.6
+"""Of the time left, what may be spent on the search for a policy that surely reaches the goal."""
+
 _FOR_SHORT = 0.6
 """Of the time left, what may be spent on the short tree while there is none."""
 
@@ -36,30 +41,52 @@ def plan_strong_cyclic(
     task: Task,
     target: Fraction,
     limits: Limits,
-    progress: Progress,  # noqa: ARG001
+    progress: Progress,
     options: Options = DEFAULTS,
 ) -> Plan:
-    """Plan for probability 1. Always returns: where there is no such policy, or a limit is reached, with a
-    tree that only reads the goal."""
+    """Plan for probability 1, else for P*. Always returns; where a limit is reached, with the best that is
+    known by then."""
     goal: Node = numbered(ConditionNode("", task.goal))
     best = BestTree.start(task, target, options.best, goal, limits)
+    solver: Solver | None = None
     status: PlanStatus = "stuck"
-    stop: Diagnostic | None = None
     try:
-        solver = Solver(task, limits)
+        sure = limits.part(_FOR_SURE)
+        solver = Solver(task, sure)
         match solver.run():
             case Solved() as solved:
                 _keep(best, solver, solved, limits)
             case Hopeless():
                 status = "out-of-reach" if target == 1 else "stuck"
-    except LimitReached as reached:
-        status, stop = "limit-reached", reached.diagnostics[0]
+    except LimitReached:
+        pass
     except KeyboardInterrupt:
         status = "interrupted"
-    plan = best.plan(status, stop)
-    if plan.figures.success == 1:
-        plan = replace(plan, tree=replace(plan.tree, bounds=(Fraction(1), Fraction(1))))
+    if best.success == 1 or status == "interrupted":
+        plan = best.plan(status)
+        bounds = (plan.figures.success, Fraction(1))
+        return replace(plan, tree=replace(plan.tree, bounds=bounds))
+    advice = None if solver is None else _Advice(solver)
+    plan = plan_policy(task, target, limits, progress, replace(options, best=best), advice=advice)
+    if status == "out-of-reach" and plan.tree.status == "limit-reached":
+        plan = replace(plan, tree=replace(plan.tree, status=status))
     return plan
+
+
+class _Advice:
+    """What a search for a strong cyclic policy has learnt, for the search for P*."""
+
+    def __init__(self, solver: Solver) -> None:
+        self.decisions, self.forbidden = solver.policy, solver.forbidden
+
+    def decide(self, state: int) -> int | None:
+        """The action of the first pair that applies."""
+        number = self.decisions.decide(state)
+        return None if number is None else self.decisions.pairs[number].action
+
+    def forbids(self, state: int, action: int) -> bool:
+        """May it lead to a state without strong cyclic policy?"""
+        return self.forbidden.forbids(state, action) is not None
 
 
 def _keep(best: BestTree, solver: Solver, solved: Solved, limits: Limits) -> None:

@@ -8,8 +8,10 @@ is known; a tree may take whichever makes it smaller.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
@@ -60,27 +62,58 @@ def best_multi_policy(found: MaxProb, limits: Limits) -> tuple[MultiPolicy, Leas
 def likely_policy(found: MaxProb, most: int) -> MultiPolicy | None:
     """The choices of one best policy in the states that its runs visit most probably, ``most`` of them,
     where there are more; None where there are not. Elsewhere a run ends."""
+    chosen = [state for state, _ in islice(_by_chance(found), most + 1)]
+    return _in(found, chosen[:most]) if len(chosen) > most else None
+
+
+def likely_way(found: MaxProb) -> MultiPolicy | None:
+    """The choices of one best policy on the most probable way to the goal, elsewhere a run ends; None where
+    there is no such way."""
+    before: dict[int, int] = {}
+    for state, source in _by_chance(found):
+        before[state] = source
+        if found.space.goal[state]:
+            way = [state]
+            while before[way[-1]] >= 0:
+                way.append(before[way[-1]])
+            return _in(found, way)
+    return None
+
+
+def one_policy(found: MaxProb) -> MultiPolicy:
+    """The choices of one best policy."""
+    only = np.zeros_like(found.best)
+    only[found.policy[found.policy >= 0]] = True
+    return multi_policy(found.space, only)
+
+
+def _by_chance(found: MaxProb) -> Iterator[tuple[int, int]]:
+    """The states that runs of one best policy visit, by the probability of the most probable way there, each
+    with the state before (-1: none)."""
     space = found.space
-    chance: dict[int, float] = {}
-    heap = [(-float(p), state) for p, state in space.initial]
+    heap = [(-float(p), state, -1) for p, state in space.initial]
     heapq.heapify(heap)
+    seen: set[int] = set()
     probability = [float(draw.probability) for draw in space.draws]
-    while heap and len(chance) < most:
-        weight, state = heapq.heappop(heap)
-        if state in chance:
+    while heap:
+        weight, state, source = heapq.heappop(heap)
+        if state in seen:
             continue
-        chance[state] = -weight
+        seen.add(state)
+        yield state, source
         choice = int(found.policy[state])
         if choice >= 0 and not space.goal[state]:
             for successor, draw in space.outcomes(choice):
-                if successor not in chance:
-                    heapq.heappush(heap, (weight * probability[draw], successor))
-    if not heap:
-        return None
+                if successor not in seen:
+                    heapq.heappush(heap, (weight * probability[draw], successor, state))
+
+
+def _in(found: MaxProb, states: list[int]) -> MultiPolicy:
+    """The choices of one best policy in some states."""
     only = np.zeros_like(found.best)
-    choices = found.policy[np.array(sorted(chance), dtype=np.int64)]
+    choices = found.policy[np.array(sorted(states), dtype=np.int64)]
     only[choices[choices >= 0]] = True
-    return multi_policy(space, only)
+    return multi_policy(found.space, only)
 
 
 def _fewest_actions(found: MaxProb, limits: Limits) -> tuple[Number, Flags]:

@@ -7,6 +7,7 @@ often it tries again (:mod:`bbtc.rewrite.retry`). 5. Simulate.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
@@ -17,11 +18,19 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.finish import GRACE, finish
-from bbtc.planner.mdp.maxprob import Bounds
+from bbtc.planner.mdp.bounded_search import Advice
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb
 from bbtc.planner.mdp.solve import best_known, best_within
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress
-from bbtc.planner.synthesis.permissive import best_multi_policy, likely_policy
+from bbtc.planner.synthesis.decision_tree import decision_tree
+from bbtc.planner.synthesis.permissive import (
+    MultiPolicy,
+    best_multi_policy,
+    likely_policy,
+    likely_way,
+    one_policy,
+)
 from bbtc.planner.synthesis.phases import phases
 from bbtc.planner.synthesis.tree import in_phases, synthesize
 from bbtc.rewrite.retry import longest_run
@@ -30,7 +39,13 @@ from bbtc.rewrite.simplify import numbered, simplified, size
 from bbtc.tree.nodes import ConditionNode, Node
 
 _BEFORE_TREE = 0.6  # of the time, for all that comes before a tree
-_DRAFTS = (50, 1000)  # states of a larger policy that a tree is made of first, to fall back on
+_FOR_COST = 0.5  # of the time left, to find the cheapest policy
+LARGE_POLICY = 1000
+"""States; of a larger policy, a tree is made fast first."""
+
+_ENOUGH = 1000  # states that the simulation of what is fallen back on may have, whatever the limit
+_DRAFTS = (1000, 50)  # states of a policy that a tree is made of, if one of all has too many nodes
+_CLOSE = Fraction(1, 10**8)  # probabilities closer than this differ by rounding
 
 
 @dataclass(slots=True)
@@ -43,6 +58,8 @@ class _Search:
     options: Options
     best: BestTree
     whole: bool = False
+    advice: Advice | None = None
+    found: MaxProb | None = None
     bounds: Bounds = field(default_factory=lambda: Bounds(Fraction(0), Fraction(1)))
     stop: Diagnostic | None = None
     interrupted: bool = False
@@ -58,19 +75,55 @@ class _Search:
             self.stop = reached.diagnostics[0]
         except KeyboardInterrupt:
             self.interrupted = True
+        self._fall_back()
 
     def _without_end(self) -> None:
-        best = best_known(self.task, self.limits.part(_BEFORE_TREE), self.target, whole=self.whole)
+        limits = self.limits.part(_BEFORE_TREE)
+        best = best_known(self.task, limits, self.target, whole=self.whole, advice=self.advice)
+        self.found = best.found
         self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
         limits = self.limits.within(GRACE) if best.interrupted else self.limits
-        for most in _DRAFTS:
-            draft = likely_policy(best.found, most)
-            if draft is None:
-                break
-            self._keep(synthesize(self.task, draft, limits), limits)
-        policy, _ = best_multi_policy(best.found, limits)
+        if likely_policy(best.found, LARGE_POLICY) is not None:
+            self._draft(one_policy(best.found), limits)
+        policy = self._cheapest(best.found, limits)
         self._keep(synthesize(self.task, policy, limits), limits)
         finish(self.best, limits, self.options)
+
+    def _cheapest(self, found: MaxProb, limits: Limits) -> MultiPolicy:
+        """The cheapest of the best policies, or one of the best if there is no time to find it."""
+        try:
+            return best_multi_policy(found, limits.part(_FOR_COST))[0]
+        except LimitReached:
+            return one_policy(found)
+
+    def _draft(self, policy: MultiPolicy, limits: Limits) -> None:
+        """A tree of a policy, however large it is, to fall back on."""
+        with suppress(LimitReached):
+            self._keep(decision_tree(self.task, policy, limits), limits)
+
+    def _fall_back(self) -> None:
+        """Write down the policy that is known, if that was not done before a limit, or the user, ended it."""
+        found = self.found
+        if found is None or self._is_reached(found):
+            return
+        # The tree visits no state that was not found, but those may be a few more than the limit, and so may
+        # what is worked out of an action.
+        few = replace(self.limits, states=max(self.limits.states, len(found.space.states), _ENOUGH))
+        try:
+            way = likely_way(found)
+            if way is not None and not self.best.success:
+                # It is small, and so there is always time for it.
+                self._draft(way, replace(few, seconds=None, until=None))
+            limits = few.overtime(GRACE)
+            for policy in (one_policy(found), *(likely_policy(found, most) for most in _DRAFTS)):
+                if policy is not None and not self._is_reached(found):
+                    self._draft(policy, limits)
+        except KeyboardInterrupt:
+            self.interrupted = True
+
+    def _is_reached(self, found: MaxProb) -> bool:
+        """Is the tree as good as the policy that is known, or as the target asks for?"""
+        return self.best.success >= min(self.target, found.initial.lower - _CLOSE)
 
     def _within(self, steps: int) -> None:
         best = best_within(self.task, self.limits.part(_BEFORE_TREE), steps)
@@ -106,13 +159,14 @@ def plan_policy(
     options: Options = DEFAULTS,
     *,
     whole: bool = False,
+    advice: Advice | None = None,
 ) -> Plan:
     """Plan by policy synthesis. Always returns; where a limit is reached, with the best that is known
-    by then. Only with ``whole`` it raises ``LimitReached`` instead where the task has more states than
-    the limit."""
+    by then. ``advice`` is what a search follows first. Only with ``whole`` it raises ``LimitReached`` instead
+    where the task has more states than the limit."""
     goal: Node = numbered(ConditionNode("", task.goal))
     search = _Search(
-        task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole
+        task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole, advice
     )
     search.run()
     if whole and search.stop is not None:

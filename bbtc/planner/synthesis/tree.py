@@ -53,13 +53,13 @@ def in_phases(task: Task, phases: Sequence[tuple[int, MultiPolicy]], limits: Lim
     for number, (steps, policy) in enumerate(phases, 1):
         tree = _tree(task, policy, limits, fall_through=number < len(phases))
         parts.append(ControlNode("", "retry", (tree,), attempts=steps))  # rule 8
-    return numbered(_control("fallback", parts) if parts else ConditionNode("", task.goal))
+    return numbered(control("fallback", parts) if parts else ConditionNode("", task.goal))
 
 
 def _tree(task: Task, policy: MultiPolicy, limits: Limits, *, fall_through: bool) -> Node:
     """``fall_through``: fail where the goal is unknown and nothing is done about it, so that what
     follows gets its turn."""
-    goal = _truths(task.goal, policy.values)
+    goal = truths(task.goal, policy.values)
     unknown: Flags = goal == Truth.UNKNOWN
     false: Flags = goal == Truth.FALSE
     nowhere = np.zeros_like(unknown)
@@ -67,31 +67,33 @@ def _tree(task: Task, policy: MultiPolicy, limits: Limits, *, fall_through: bool
     ending = ~policy.having()
     watching = learner.learn(unknown, nowhere)
     acting = learner.learn(false, unknown & ending)
-    node = _goal_node(task, policy.values[learner.relevant()])
+    node = goal_node(task, policy.values[learner.relevant()])
     build = _Builder(task, policy.values, limits)
     if watching:  # rule 2
-        node = _control("skipper", [node, build.choice(build.rules(watching))])
+        node = control("skipper", [node, build.choice(build.rules(watching))])
     elif fall_through and (unknown & learner.relevant()).any():
-        node = _control("skipper", [node, ConditionNode("", FALSE)])
+        node = control("skipper", [node, ConditionNode("", FALSE)])
     children = build.rules(acting)
-    return _control("fallback", [node, *children]) if children else node  # rule 1
+    return control("fallback", [node, *children]) if children else node  # rule 1
 
 
-def _truths(condition: Condition, values: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+def truths(condition: Condition, values: npt.NDArray[np.uint8]) -> npt.NDArray[np.int64]:
+    """The truth value of a condition in each row of values."""
     test = compile_condition(condition)
     return np.array([int(test(row)) for row in values.tolist()], dtype=np.int64)
 
 
-def _goal_node(task: Task, values: npt.NDArray[np.uint8]) -> Node:
+def goal_node(task: Task, values: npt.NDArray[np.uint8]) -> Node:
     """The goal, a node for each of its parts unless some part may be unknown: in a Sequence, an
     unknown part would hide a false one behind it."""
     parts = conjuncts(task.goal)
-    if len(parts) < 2 or any((_truths(part, values) == Truth.UNKNOWN).any() for part in parts):
+    if len(parts) < 2 or any((truths(part, values) == Truth.UNKNOWN).any() for part in parts):
         return ConditionNode("", task.goal)
-    return _control("sequence", [ConditionNode("", part) for part in parts])  # rule 3
+    return control("sequence", [ConditionNode("", part) for part in parts])  # rule 3
 
 
-def _control(kind: ControlKind, children: Sequence[Node]) -> Node:
+def control(kind: ControlKind, children: Sequence[Node]) -> Node:
+    """A control node; of a single child, that child."""
     return children[0] if len(children) == 1 else ControlNode("", kind, tuple(children))
 
 
@@ -108,7 +110,7 @@ class _Builder:
     """Rules that may still be looked at for tests to share."""
 
     def choice(self, children: list[Node]) -> Node:
-        return _control("fallback", children)
+        return control("fallback", children)
 
     def rules(self, rules: Sequence[Rule]) -> list[Node]:
         """The rules as children of a Fallback, in order."""
@@ -124,7 +126,7 @@ class _Builder:
                 break
             asked = rules[start].asked[literal.holds(self.values[rules[start].asked])]
             inner[0] = replace(inner[0], asked=asked)
-            branch = _control(
+            branch = control(
                 "sequence", [ConditionNode("", literal.condition), self.choice(self.rules(inner))]
             )
             nodes = [*self.rules(rules[:start]), branch, *self.rules(rules[end:])]
@@ -158,10 +160,10 @@ class _Builder:
                 alike.append(rules[position + len(alike)])
             action = ActionNode("", self.task.actions[rule.action].name, latched=False)
             if all(each.tests for each in alike) and len(alike) > 1:  # rule 6
-                tests = [_control("sequence", self._conditions(each)) for each in alike]
-                nodes.append(_control("sequence", [self.choice(tests), action]))
+                tests = [control("sequence", self._conditions(each)) for each in alike]
+                nodes.append(control("sequence", [self.choice(tests), action]))
             else:
-                nodes.extend(_control("sequence", [*self._conditions(each), action]) for each in alike)
+                nodes.extend(control("sequence", [*self._conditions(each), action]) for each in alike)
             position += len(alike)
         return nodes
 
