@@ -27,11 +27,11 @@ _FEW_STATES = 200
 """A tree with so many states is simulated in all of them; one with more, in as many as differ in what
 matters."""
 
-_MOST_SHORT = 6
-"""How many short trees are tried; each decides as the policy in the states that those before it met."""
-
 _FOR_SURE = 0.6
 """Of the time left, what may be spent on the search for a policy that surely reaches the goal."""
+
+_MOST_SHORT = 6
+"""How many short trees are tried; each decides as the policy in the states that those before it met."""
 
 _FOR_SHORT = 0.6
 """Of the time left, what may be spent on the short tree while there is none."""
