@@ -64,7 +64,7 @@ HOSPITAL = """; A robot brings medicine to the nurse of a ward. Driving may empt
 def hospital(tmp_path: Path) -> Path:
     """The tree for the hospital."""
     (tmp_path / "hospital.pddl").write_text(HOSPITAL.replace("GOAL", "(delivered)"))
-    bbtc("plan", str(tmp_path / "hospital.pddl"), "-q", "-o", str(tmp_path / "tree.json"))
+    bbtc("plan", str(tmp_path / "hospital.pddl"), "-q", "--closed-world", "-o", str(tmp_path / "tree.json"))
     return tmp_path / "tree.json"
 
 
