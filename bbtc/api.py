@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bbtc.ground.task import Task
     from bbtc.model.domain import Model
     from bbtc.planner.bounds import TaskValue
-    from bbtc.planner.options import Retries
+    from bbtc.planner.options import Prefer, Retries
     from bbtc.planner.result import Plan, Refinement
     from bbtc.tree.nodes import Tree
     from bbtc.verifier.verdict import Engine, Verdict
@@ -141,8 +141,10 @@ def plan(
     target: Probability | None = None,
     strategy: str | None = None,
     max_actions: int | None = None,
-    retries: Retries = "least",
-    guarded: bool = False,
+    retries: Retries = "unbounded",
+    prefer: Prefer = "success",
+    closed_world: bool = False,
+    guarded: bool | None = None,
     problem: str | None = None,
     lenient: bool = False,
     limits: Limits | None = None,
@@ -153,19 +155,24 @@ def plan(
 
     Without ``limits``, planning takes a minute at most. ``strategy`` is ``advised`` (the default),
     ``auto``, ``search``, ``policy``, ``strong-cyclic`` or ``refine``;
-    ``max_actions`` bounds the actions of every run; ``guarded`` trees check preconditions and the goal in
-    worlds that others change, too; ``problem`` and ``lenient`` as in :func:`load`; ``progress`` is told
-    each refinement as it is made.
+    ``max_actions`` bounds the actions of every run; ``retries`` are ``unbounded``, or the ``least`` that meet
+    the target; of trees that meet it, ``prefer`` those of most ``success``, least ``cost`` or least ``size``;
+    in a ``closed_world`` nobody else changes anything, and what the tree reads only for that is left out
+    (``guarded=False`` means the same, and ``guarded=True`` the contrary); ``problem`` and ``lenient`` as in
+    :func:`load`; ``progress`` is told each refinement as it is made.
     The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
     Raises :class:`BbtcError` for input that is wrong and an unknown strategy, :class:`LimitReached` where the
-    limits allow no tree at all, and ``ValueError`` for a target that is no probability.
+    limits allow no tree at all, and ``ValueError`` for a target that is no probability, and for a
+    guarded tree in a closed world.
     """
     from bbtc import pipeline
     from bbtc.planner.options import Options
     from bbtc.planner.strategies import DEFAULT
 
     limits = limits or Limits(seconds=PLANNING_SECONDS)
-    options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
+    if closed_world and guarded:
+        raise ValueError("in a closed world trees have no guards")
+    options = Options(max_actions, retries, prefer, closed_world or guarded is False)
     tell = progress or (lambda _: None)
     task = _task(inputs, limits, report, Reading(problem, lenient))
     return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)

@@ -27,6 +27,14 @@ PLANNING_SECONDS = 60.0
 """The time that planning may take unless somebody says otherwise."""
 
 
+@dataclass(slots=True)
+class Effort:
+    """How often a computation may still look at the clock: a bound on work that is the same on every machine,
+    unlike one on time."""
+
+    looks: int
+
+
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Bounds for one run; ``None`` means no bound.
@@ -40,7 +48,7 @@ class Limits:
     process may take (its resident set), and those of the engine that grounding runs beside it.
 
     ``watcher`` is told what is being done whenever time is looked at. ``until`` is the moment (of
-    ``time.monotonic``) at which a part of the work has to end.
+    ``time.monotonic``) at which a part of the work has to end, ``effort`` another bound on such a part.
     """
 
     seconds: float | None = None
@@ -55,6 +63,7 @@ class Limits:
     depth: int = 100
     watcher: Watcher | None = field(default=None, compare=False, repr=False)
     until: float | None = field(default=None, compare=False, repr=False)
+    effort: Effort | None = field(default=None, compare=False, repr=False)
     _start: float = field(default_factory=time.monotonic, compare=False, repr=False)
 
     def afresh(self) -> Limits:
@@ -112,6 +121,10 @@ class Limits:
         if self.remaining == 0:
             seconds = "" if self.seconds is None else f" of {self.seconds:g} s"
             raise self.reached(f"the time limit{seconds} ended {doing}", "--time-limit")
+        if self.effort is not None:
+            self.effort.looks -= 1
+            if self.effort.looks < 0:
+                raise self.reached(f"a second opinion ended {doing}", "--time-limit")
         self.check_memory(doing)
 
     @property

@@ -390,13 +390,14 @@ def plan_task(
     from bbtc.belief.soundness import violations
     from bbtc.planner.best_tree import BestTree
     from bbtc.planner.bounds import judged
+    from bbtc.planner.guard import guarded
     from bbtc.planner.options import DEFAULTS
     from bbtc.planner.strategies import run_strategy
     from bbtc.tree.validate import check_tree
 
     wanted = task.goal_probability if target is None else target
     options = options or DEFAULTS
-    best = BestTree(task, wanted)
+    best = BestTree(task, wanted, options.prefer == "size")
     searching = limits.but_for(_LAST_STEPS)
     plan: Plan | None = None
     try:
@@ -414,6 +415,8 @@ def plan_task(
     except KeyboardInterrupt:
         search_ends()
         plan = plan or best.plan("interrupted")
+    if not options.closed_world:
+        plan = guarded(plan)
     check_tree(plan.tree)
     broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:

@@ -142,7 +142,7 @@ def _plan(job: Job, report: Report, limits: Limits, watch: Watch) -> Plan:
     entry = job.entry
     sources = [decode_source(name, data) for name, data in job.sources]
     task = pipeline.task_of_sources(sources, report, limits, entry.reading)
-    options = Options(max_actions=entry.max_actions, retries=entry.retries, guarded=entry.guarded)
+    options = Options(entry.max_actions, entry.retries, entry.prefer, entry.closed_world)
     plan = pipeline.plan_task(
         task, entry.target, entry.strategy, limits, lambda _: None, options=options, search_ends=watch.off
     )

@@ -178,7 +178,7 @@ class _Builder:
 
         versions = self.state.versions
         tool = versions["bbtc"]
-        options = (entry.strategy, entry.max_actions, entry.retries, entry.guarded)
+        options = (entry.strategy, entry.max_actions, entry.retries, entry.prefer, entry.closed_world)
         reading = (entry.reading.problem, entry.reading.lenient)
         planned = (entry.inputs, reading, entry.target, options, entry.limits)
         steps = {TREE: Step(settings_digest(tool, planned, entry.file), {}, {})}

@@ -7,7 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from bbtc.manifest.expectations import Expectation
-from bbtc.planner.options import Retries
+from bbtc.planner.options import Prefer, Retries
 from bbtc.planner.strategies import DEFAULT
 from bbtc.source import AS_WRITTEN, Reading, Span
 
@@ -40,8 +40,9 @@ class TreeEntry:
     target: Fraction | None = None
     strategy: str = DEFAULT
     max_actions: int | None = None
-    retries: Retries = "least"
-    guarded: bool = False
+    retries: Retries = "unbounded"
+    prefer: Prefer = "success"
+    closed_world: bool = False
     reading: Reading = AS_WRITTEN
     limits: tuple[tuple[str, int | None], ...] = ()
     exports: tuple[Export, ...] = ()

@@ -19,7 +19,7 @@ from bbtc.manifest.entries import Export, Manifest, TreeEntry
 from bbtc.manifest.expectations import Expectation, parse_expectation
 from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
 from bbtc.manifest.places import Places
-from bbtc.planner.options import Retries
+from bbtc.planner.options import Prefer, Retries
 from bbtc.planner.strategies import DEFAULT, STRATEGIES
 from bbtc.printable import printable
 from bbtc.source import Reading
@@ -35,7 +35,7 @@ MOST_VALUES = 250_000
 """Settings, expectations and exports of all trees, those that are shared counted for each."""
 _INPUTS = ("domain", "problem")
 _READING = ("problem-name", "lenient")
-_PLANNING = ("target", "strategy", "max-actions", "retries", "guarded", "limits")
+_PLANNING = ("target", "strategy", "max-actions", "retries", "prefer", "closed-world", "guarded", "limits")
 _SETTINGS = (*_INPUTS, *_READING, *_PLANNING, "exports", "expect", "perturb")
 _LIMITS = {"time": "seconds", "states": "states", "nodes": "nodes", "ground-actions": "actions"}
 
@@ -116,6 +116,15 @@ class _Reader:
                 self.shared[key] = attempt(lambda: read(found[key]), default)
             return cast("_T", self.shared[key])
 
+        # Two names of one setting; what a tree says itself counts more than the defaults.
+        worlds = {
+            "closed-world": optional("closed-world", At.flag, False),
+            "guarded": not optional("guarded", At.flag, True),
+        }
+        given_worlds = [key for key in worlds if key in found]
+        own = [key for key in given_worlds if found[key] is not defaults.get(key)] or given_worlds
+        if len({worlds[key] for key in own}) > 1:
+            self.faults.add(found["guarded"].fault("BBT0604", "contradicts `closed-world`").diagnostic)
         entry = TreeEntry(
             name=name,
             inputs=inputs,
@@ -123,8 +132,9 @@ class _Reader:
             target=optional("target", _target, None),
             strategy=optional("strategy", lambda each: _text(each) and each.word(*STRATEGIES), DEFAULT),
             max_actions=optional("max-actions", _count, None),
-            retries=optional("retries", _retries, "least"),
-            guarded=optional("guarded", At.flag, False),
+            retries=optional("retries", _retries, "unbounded"),
+            prefer=optional("prefer", _prefer, "success"),
+            closed_world=any(worlds[key] for key in own),
             reading=Reading(optional("problem-name", _text, None), optional("lenient", At.flag, False)),
             limits=optional("limits", self._limits, ()),
             exports=optional("exports", lambda each: self._exports(each, name), ()),
@@ -265,7 +275,12 @@ def _count(at: At) -> int:
 
 
 def _retries(at: At) -> Retries:
-    return "unbounded" if at.word("least", "unbounded") == "unbounded" else "least"
+    return "least" if at.word("unbounded", "least") == "least" else "unbounded"
+
+
+def _prefer(at: At) -> Prefer:
+    word = at.word("success", "cost", "size")
+    return "cost" if word == "cost" else "size" if word == "size" else "success"
 
 
 def _target(at: At) -> Fraction:

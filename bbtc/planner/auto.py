@@ -1,36 +1,54 @@
 """The strategies that choose among others.
 
-``auto``: the smallest tree found that reaches the target and, among those, the cheapest;
-where none does, the one with the greatest success probability.
+``auto`` has several planners make a tree, each with a share of the time, and keeps the best
+(:mod:`bbtc.planner.objective`). What one of them finds decides how much the next ones may do:
 
 1. Search over refinements: it takes time with the size of the tree, not of the task.
-2. Write down an optimal policy. Where a tree that reaches the target is known already, only if the actions
-   and states of the task are few, or the tree is large and they are not very many; else as the limits
-   allow, since the policy tells whether the target can be reached.
-3. Refine greedily, as published, in as many nodes as would make a smaller tree than those found; of
-   a task with many actions, again, only where the target was not reached.
+2. Write down an optimal policy, of the whole space where that is small. Where a tree that meets the target is
+   known already, as few states and actions as take a moment are looked at, or, where it is large, some more.
+3. A policy over partial states, which surely reaches the goal, unless it is known that there is none. Where a
+   tree that meets the target is known, with an effort of a moment.
+4. Where nothing met the target, write down the best policy that the limits allow to find: it tells whether
+   the target can be reached.
+5. Refine greedily, as published, where nothing met the target, or, if the smallest tree is asked for, in as
+   many nodes as would make a smaller one than those found.
+6. Unless the world is closed or the smallest tree is asked for, plan as in 2 and 3 once more, for what others
+   may make of the initial state, too (:mod:`bbtc.planner.elsewhere`).
 
 ``advised``, the default: templates are their author's advice on how things are done, and only refinement
-follows it. Where a task has templates, and refinement reaches the target, its tree is taken; else ``auto``.
+follows it. Where a task has templates, and refinement meets the target, its tree is taken, with equal
+attempts that follow one another put together (:mod:`bbtc.rewrite.repeat`); else ``auto``.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
+from bbtc.belief.chain import explore
+from bbtc.belief.simulate import figures, success_of
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
-from bbtc.limits import Limits
+from bbtc.kleene import Truth
+from bbtc.limits import Effort, Limits
+from bbtc.planner.best_tree import BestTree
 from bbtc.planner.chaining.refine import refine
 from bbtc.planner.chaining.search import plan_search
+from bbtc.planner.elsewhere import also_at, only_at, starts_elsewhere
+from bbtc.planner.finish import bound_attempts
+from bbtc.planner.guard import guarded
+from bbtc.planner.objective import Worth, best_of
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress, Refinement
+from bbtc.planner.strong_cyclic.plan import plan_strong_cyclic
 from bbtc.planner.synthesis.policy import plan_policy
+from bbtc.rewrite.repeat import with_repeats
 from bbtc.rewrite.simplify import size
 
 MANY_ACTIONS = 500
-"""A task with more gets no second opinion once a tree reaches the target."""
+"""A task with more gets no second opinion once a tree meets the target."""
 
 STATES_AND_ACTIONS = 200_000
 """For a second opinion, states times actions of the task are explored up to this number."""
@@ -41,14 +59,22 @@ LARGE_TREE = 100
 _WORK_FOR_LARGE = 3_000_000
 """States times actions explored for a second opinion on a large tree: some seconds."""
 
+_LOOKS = 150
+"""Looks at the clock in the search for a policy over partial states, for a second opinion."""
+
+_LOOKS_ELSEWHERE = 1500
+"""The same for policies from states that others may leave the world in."""
+
 _REFINE_STATES = 20_000
 """States of one simulation while refining for a second opinion."""
+
+_SEARCH_SHARE, _SURE_SHARE = 0.4, 0.5  # of the time left
 
 
 def plan_auto(
     task: Task, target: Fraction, limits: Limits, progress: Progress, options: Options = DEFAULTS
 ) -> Plan:
-    """Plan by search, by policy synthesis and by refinement, and keep the best tree. Always returns;
+    """Plan by several strategies, and keep the best tree. Always returns;
     refinements are told to ``progress`` only if their tree is kept. Raises
     :class:`bbtc.diagnostics.LimitReached` only if the limits do not even allow the simulation of the
     initial belief."""
@@ -61,8 +87,11 @@ def plan_advised(
     """Plan by refinement where the task has templates, else, and where that falls short of the target, by
     :func:`plan_auto`, and as that does."""
     advised = None
-    if task.templates and len(task.actions) <= MANY_ACTIONS and options == DEFAULTS:
+    follows = options.prefer == "success" and options.retries == "unbounded" and options.max_actions is None
+    if task.templates and len(task.actions) <= MANY_ACTIONS and follows:
         advised = _refined(task, target, limits, limits.nodes, options)
+        if advised.tree.status == "target-reached":
+            advised = _with_repeats(advised, limits)
         if advised.tree.status in {"target-reached", "interrupted"}:
             return _told(advised, progress)
     return _told(_best(task, target, limits, options, advised), progress)
@@ -78,64 +107,201 @@ def _silent(step: Refinement) -> None:
     del step
 
 
+@dataclass(slots=True)
+class _Auto:
+    """The plans found so far."""
+
+    task: Task
+    target: Fraction
+    limits: Limits
+    options: Options
+    plans: list[Plan] = field(default_factory=list)
+    elsewhere: Task | None = None
+    """The task, beginning in states that others may leave it in."""
+
+    @property
+    def best(self) -> Plan:
+        """The best of them."""
+        worths = [Worth.of(plan, self.recovery(plan)) for plan in self.plans]
+        return self.plans[best_of(worths, self.target, self.options.prefer)]
+
+    @property
+    def met(self) -> bool:
+        """Does one meet the target?"""
+        return self.best.tree.success_probability >= self.target
+
+    @property
+    def interrupted(self) -> bool:
+        """Did the user end it?"""
+        return any(plan.tree.status == "interrupted" for plan in self.plans)
+
+    @property
+    def upper(self) -> Fraction:
+        """No policy does better."""
+        return min((plan.tree.bounds[1] for plan in self.plans if plan.tree.bounds), default=Fraction(1))
+
+    def add(self, plan: Plan | None) -> None:
+        """Take a plan into account."""
+        if plan is not None:
+            self.plans.append(plan if self.options.closed_world else guarded(plan))
+
+    def run(self, refined: Plan | None) -> None:
+        """Make plans; ``refined`` is what refinement made, if it fell short of the target before."""
+        task, target, limits, options = self.task, self.target, self.limits, self.options
+        self.add(plan_search(task, target, limits.part(_SEARCH_SHARE), _silent, options))
+        for step in (self.of_few_states, self.surely, self.of_all_states):
+            if not self.interrupted:
+                self.add(step())
+        if not self.interrupted:
+            self.add(self.refinement(refined))
+        if not self.interrupted and not options.closed_world and options.prefer != "size":
+            with suppress(LimitReached):
+                self.go_on_from_elsewhere()
+
+    def recovery(self, plan: Plan) -> Fraction:
+        """How often a tree succeeds from where others may leave the world; 0 where that takes too long."""
+        if self.elsewhere is None:
+            return Fraction(0)
+        few = replace(self.limits, states=min(self.limits.states, _REFINE_STATES))
+        try:
+            return success_of(explore(self.elsewhere, plan.tree.root, few))
+        except LimitReached:
+            return Fraction(0)
+
+    def go_on_from_elsewhere(self) -> None:
+        """Policies that hold from where others may leave the world, too. Raises ``LimitReached``."""
+        task, best = self.task, self.best
+        if not best.tree.success_probability or len(task.actions) > MANY_ACTIONS:
+            return
+        starts = starts_elsewhere(task, self.limits)
+        if not starts:
+            return
+        few = replace(self.limits, states=max(1, STATES_AND_ACTIONS // len(task.actions)))
+        with suppress(LimitReached):
+            wider = also_at(task, starts)
+            self.add_for_own_starts(plan_policy(wider, self.target, few, _silent, self.inner, whole=True))
+        if any(plan.tree.success_probability == 1 and plan.chain is not None for plan in self.plans):
+            self.surely_from(starts)
+        self.elsewhere = only_at(task, starts)
+
+    def surely_from(self, starts: Sequence[tuple[Truth, ...]]) -> None:
+        """A policy over partial states for those of the starts from which one surely reaches the goal."""
+        limits = replace(self.limits.part(_SURE_SHARE), effort=Effort(_LOOKS_ELSEWHERE))
+
+        def surely(task: Task) -> Plan:
+            return plan_strong_cyclic(task, Fraction(1), limits, _silent, self.inner)
+
+        sure = [each for each in starts if surely(only_at(self.task, [each])).tree.success_probability == 1]
+        if sure:
+            self.add_for_own_starts(surely(also_at(self.task, sure)))
+
+    @property
+    def inner(self) -> Options:
+        """For plans of other tasks than this one."""
+        return replace(self.options, best=None)
+
+    def add_for_own_starts(self, plan: Plan) -> None:
+        """Take the tree of a plan for other starts into account. Raises ``LimitReached``."""
+        if plan.tree.status == "interrupted":
+            raise KeyboardInterrupt
+        root = plan.tree.root
+        chain = explore(self.task, root, replace(self.limits, states=min(self.limits.states, _REFINE_STATES)))
+        best = BestTree(self.task, self.target, outer=self.options.best)
+        best.take(root, chain, success_of(chain))
+        self.add(best.plan("stuck"))
+
+    def of_few_states(self) -> Plan | None:
+        """An optimal policy, where a moment is enough to explore the whole space."""
+        nodes, actions = size(self.best.tree.root), len(self.task.actions)
+        if self.met and (nodes == 1 or actions > MANY_ACTIONS):
+            return None
+        work = _WORK_FOR_LARGE if nodes > LARGE_TREE else STATES_AND_ACTIONS
+        few = replace(self.limits, states=max(1, min(self.limits.states, work // max(1, actions))))
+        try:
+            return plan_policy(self.task, self.target, few, _silent, self.options, whole=True)
+        except LimitReached:  # more states than that
+            return None
+
+    def surely(self) -> Plan | None:
+        """A policy over partial states, unless there is none that surely reaches the goal."""
+        if self.upper < 1:
+            return None
+        limits = self.limits.part(_SURE_SHARE)
+        if self.met:
+            if size(self.best.tree.root) == 1 or len(self.task.actions) > MANY_ACTIONS:
+                return None
+            limits = replace(limits, effort=Effort(_LOOKS))
+        return plan_strong_cyclic(self.task, self.target, limits, _silent, self.options)
+
+    def of_all_states(self) -> Plan | None:
+        """The best policy that can be found, where nothing met the target."""
+        if self.met or self.upper <= self.best.tree.success_probability:
+            return None
+        return plan_policy(self.task, self.target, self.limits, _silent, self.options)
+
+    def refinement(self, refined: Plan | None) -> Plan | None:
+        """The greedy refinement, where that may help."""
+        best = self.best
+        if not self.met:
+            if best.tree.success_probability >= self.upper:
+                return None  # nothing can do better
+            return refined or self.greedy(self.limits.nodes)
+        if self.options.prefer != "size" or refined is not None or len(self.task.actions) > MANY_ACTIONS:
+            return None
+        return self.greedy(min(self.limits.nodes, size(best.tree.root) - 1))  # a larger one would not be kept
+
+    def greedy(self, most: int) -> Plan | None:
+        """Greedy refinement within so many nodes."""
+        if most < 1:
+            return None
+        try:
+            return _refined(self.task, self.target, self.limits, most, self.options)
+        except LimitReached:  # not even the goal alone is small enough
+            return None
+
+
 def _best(task: Task, target: Fraction, limits: Limits, options: Options, refined: Plan | None) -> Plan:
     """The best plan; ``refined`` is what refinement made, if it fell short of the target before."""
     if options.max_actions is not None:
         return plan_policy(task, target, limits, _silent, options)
-    plans = [plan_search(task, target, limits, _silent, options)]
-    if plans[0].tree.status != "interrupted":
-        second = _policy(task, target, limits, options, plans[0])
-        plans.extend([] if second is None else [second])
-        if all(plan.tree.status != "interrupted" for plan in plans):
-            third = _refine(task, limits, options, min(plans, key=_rank), refined)
-            plans.extend([] if third is None else [third])
-    return _with_findings(min(plans, key=_rank), plans)
+    auto = _Auto(task, target, limits, replace(options, retries="unbounded"))
+    auto.run(refined)
+    return _with_findings(_bounded(auto.best, limits, options), auto.plans)
 
 
-def _policy(task: Task, target: Fraction, limits: Limits, options: Options, known: Plan) -> Plan | None:
-    if known.tree.status != "target-reached":
-        return plan_policy(task, target, limits, _silent, options)
-    if size(known.tree.root) == 1 or len(task.actions) > MANY_ACTIONS:
-        return None
-    work = _WORK_FOR_LARGE if size(known.tree.root) > LARGE_TREE else STATES_AND_ACTIONS
-    few = max(1, min(limits.states, work // max(1, len(task.actions))))
+def _bounded(plan: Plan, limits: Limits, options: Options) -> Plan:
+    """The plan with as many attempts as the target takes, where that was asked for."""
+    tree = plan.tree
+    if options.retries != "least" or plan.chain is None:
+        return plan
+    best = BestTree(tree.task, tree.target, outer=options.best)
+    best.take(tree.root, plan.chain, tree.success_probability)
     try:
-        found = plan_policy(task, target, replace(limits, states=few), _silent, options, whole=True)
-    except LimitReached:  # more states than that
-        return None
-    return found
+        bound_attempts(best, limits)
+    except LimitReached:
+        return plan
+    found = best.plan(tree.status)
+    return replace(found, initial_success=plan.initial_success, refinements=plan.refinements)
 
 
-def _refine(task: Task, limits: Limits, options: Options, best: Plan, refined: Plan | None) -> Plan | None:
-    tree, target = best.tree, best.tree.target
-    most = limits.nodes
-    if tree.status == "target-reached":
-        most = min(most, size(tree.root) - 1)  # a larger tree would not be kept
-        if len(task.actions) > MANY_ACTIONS:
-            return None
-    elif tree.bounds is not None and tree.success_probability == tree.bounds[1]:
-        return None  # nothing can do better
-    if refined is not None:
-        return None if tree.status == "target-reached" else refined
-    if most < 1:
-        return None
+def _with_repeats(plan: Plan, limits: Limits) -> Plan:
+    """The plan with equal attempts that follow one another put together."""
+    tree, chain = plan.tree, plan.chain
+    if chain is None:
+        return plan
     try:
-        return _refined(task, target, limits, most, options)
-    except LimitReached:  # not even the goal alone is small enough
-        return None
+        root = with_repeats(tree.task, tree.root, chain, limits)
+        if root is tree.root:
+            return plan
+        chain = explore(tree.task, root, limits)
+    except LimitReached:
+        return plan
+    return replace(plan, tree=replace(tree, root=root), figures=figures(tree.task, root, chain), chain=chain)
 
 
 def _refined(task: Task, target: Fraction, limits: Limits, nodes: int, options: Options) -> Plan:
     few = replace(limits, nodes=nodes, states=min(limits.states, _REFINE_STATES))
     return refine(task, target, few, _silent, options)
-
-
-def _rank(plan: Plan) -> tuple[bool, Fraction, int, bool, Fraction]:
-    """Sort key, best first."""
-    tree, cost = plan.tree, plan.figures.cost
-    reached = tree.success_probability >= tree.target
-    missing = Fraction(0) if reached else -tree.success_probability
-    return (not reached, missing, size(tree.root), cost is None, cost or Fraction(0))
 
 
 def _with_findings(kept: Plan, plans: list[Plan]) -> Plan:

@@ -26,10 +26,12 @@ class _Kept:
 @dataclass(slots=True)
 class BestTree:
     """What a planner has found for a task and a target. What is better than all that ``outer`` knows, the
-    best tree of the planner that asked this one, is told to it, too."""
+    best tree of the planner that asked this one, is told to it, too. With ``smallest``, success beyond the
+    target counts for nothing."""
 
     task: Task
     target: Fraction
+    smallest: bool = False
     outer: BestTree | None = None
     initial: Fraction = Fraction(0)
     """The success probability before anything is done."""
@@ -42,7 +44,7 @@ class BestTree:
         """To begin with: a tree of which every planner knows that it can be made. Raises
         :class:`bbtc.diagnostics.LimitReached` if it cannot even be simulated."""
         chain = explore(task, root, limits)
-        found = cls(task, target, outer, success_of(chain))
+        found = cls(task, target, outer is not None and outer.smallest, outer, success_of(chain))
         found.offer(root, chain, found.initial)
         return found
 
@@ -75,9 +77,11 @@ class BestTree:
         """Keep a tree if it does better than the one kept, or as well with fewer nodes."""
         kept = self._kept
         size = sum(1 for _ in walk(root))
-        new = (min(success, self.target), -size)
-        if kept is None or new > (min(kept.success, self.target), -kept.size):
+        if kept is None or (self._counts(success), -size) > (self._counts(kept.success), -kept.size):
             self.take(root, chain, success, steps)
+
+    def _counts(self, success: Fraction) -> Fraction:
+        return min(success, self.target) if self.smallest else success
 
     def take(
         self, root: Node, chain: Chain, success: Fraction, steps: tuple[Refinement, ...] | None = None

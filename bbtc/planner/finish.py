@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from bbtc.belief.chain import explore
 from bbtc.belief.simulate import success_of
 from bbtc.belief.state import Transition
 from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
+from bbtc.planner.guard import with_guards
+from bbtc.planner.objective import MORE_NODES, allowance
 from bbtc.planner.options import Options
 from bbtc.rewrite.retry import with_least_attempts
 from bbtc.rewrite.shrink import shrunk
@@ -22,7 +26,7 @@ def finish(
 ) -> None:
     """Take from the best tree what its runs, or the target, do not need, and give it as many attempts as the
     options say; what was done before a limit stays. Raises ``LimitReached``."""
-    task, target = best.task, best.target
+    task = best.task
 
     def taken(root: Node) -> Node:
         root = numbered(root)
@@ -30,11 +34,34 @@ def finish(
         best.take(root, chain, success_of(chain))
         return root
 
-    root = taken(simplified(task, best.root, limits, transitions))
-    smaller = shrunk(task, root, target, limits, transitions)
+    def without_branches(success: Fraction) -> Node:
+        return shrunk(task, root, success, limits, transitions, closed_world=options.closed_world)
+
+    limits.check_time("the search for a small tree")
+    # Actions that read what they need may fail, and something else has its turn then.
+    root = best.root if options.closed_world else with_guards(task, best.root)
+    root = taken(simplified(task, root, limits, transitions, closed_world=options.closed_world))
+    smaller = root
+    if options.prefer == "size":
+        smaller = without_branches(best.target)
+    elif options.closed_world:
+        smaller = without_branches(best.success)
+    elif size(root) > MORE_NODES and best.success > best.target:
+        # Branches that the simulation does not need help where others change the world.
+        smallest = without_branches(best.target)
+        smaller = smallest if size(root) > allowance(size(smallest)) else root
     if smaller is not root:
         root = taken(smaller)
-    if options.retries == "least" and best.success > target:
-        retried = with_least_attempts(task, root, target, limits)
-        if retried is not root and size(retried) <= limits.nodes:
-            taken(retried)
+    if options.retries == "least":
+        bound_attempts(best, limits)
+
+
+def bound_attempts(best: BestTree, limits: Limits) -> None:
+    """Give the best tree as many attempts as the target takes, and no more. Raises ``LimitReached``."""
+    if best.success <= best.target:
+        return
+    root = with_least_attempts(best.task, best.root, best.target, limits)
+    if root is not best.root and size(root) <= limits.nodes:
+        root = numbered(root)
+        chain = explore(best.task, root, limits)
+        best.take(root, chain, success_of(chain))

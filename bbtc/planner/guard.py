@@ -2,42 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from itertools import count
 
-from bbtc.belief.chain import explore
+from typing_extensions import assert_never
+
+from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import figures
-from bbtc.ground.condition import FALSE, TRUE, Condition, Is, conjunction, conjuncts, doubt, negation
+from bbtc.belief.tick import NodeStatus, compile_tick
+from bbtc.ground.condition import FALSE, Condition, Is, conjunction, conjuncts, doubt, negation
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.result import Plan
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, walk
+from bbtc.rewrite.ensured import GO_ON, Facts, returned
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, retries_of, walk
 
 
-def guarded(plan: Plan, limits: Limits) -> Plan:
-    """The plan with the checks that the simulated world makes redundant: every action node is guarded by the
-    action's precondition, and what the goal consists of is read last of all.
+def guarded(plan: Plan) -> Plan:
+    """The plan with the checks that matter only where others change the world: every action reads its
+    precondition before it starts, and what the goal consists of is read last of all, but for what the place
+    of a node ensures in any state (:mod:`bbtc.rewrite.ensured`).
 
-    In the simulation the tree does the same actions and succeeds in the same runs. Only runs that end with
-    all attempts of a retry node used up may end blocked instead of failed, where the action that is refused
-    has an unknown precondition; should the tree succeed less often for it, actions below retry nodes stand
-    behind a test that fails there (two nodes more for each). A limit on time does not count: the plan may be
-    what was found within it. Raises ``LimitReached`` at the others.
+    In the simulation the tree does the same actions and succeeds in the same runs, which start actions only
+    where their preconditions are true. Only runs that end with all attempts of a retry node used up may end
+    blocked instead of failed, where the action that is refused has an unknown precondition; where something
+    else has its turn after it, a test that fails there stands before the action (two nodes more).
     """
-    task, limits = plan.tree.task, replace(limits, seconds=None)
-    root = _with_goal(task, plan.tree.root)
-    found = _with_guards(task, root)
-    chain = explore(task, found, limits)
-    done = figures(task, found, chain)
-    if (done.success, done.cost) != (plan.figures.success, plan.figures.cost):
-        found = _with_guards(task, root, tests=_below_retries(root))
-        chain = explore(task, found, limits)
+    task, root = plan.tree.task, plan.tree.root
+    found = with_guards(task, root)
+    if found == root:
+        return plan
+    chain, done = plan.chain, plan.figures
+    if chain is not None:
+        chain = replace(chain, actions=tuple(actions_of(found)))
+    if any(retries_of(root)):
+        chain = _ending_anew(task, found, chain or explore(task, found, Limits()))
         done = figures(task, found, chain)
     if (done.success, done.cost) != (plan.figures.success, plan.figures.cost):
         raise AssertionError("a guard changed what a tree does")
     return replace(plan, tree=replace(plan.tree, root=found), figures=done, chain=chain)
+
+
+def with_guards(task: Task, root: Node) -> Node:
+    """A tree with the checks of :func:`guarded`."""
+    return _with_goal(task, _Guarding(task, Facts(task), _fresh(root)).node(root, _Last()))
 
 
 def most_more(task: Task) -> int:
@@ -45,30 +56,86 @@ def most_more(task: Task) -> int:
     return len(conjuncts(task.goal)) + 1
 
 
-def _below_retries(root: Node) -> frozenset[str]:
-    """The actions below retry nodes that are not latched, and so fail once all attempts are used up."""
-    retries = [node for node in walk(root) if isinstance(node, ControlNode) and node.kind == "retry"]
-    return frozenset(node.id for retry in retries for node in actions_of(retry) if not node.latched)
+def _ending_anew(task: Task, root: Node, chain: Chain) -> Chain:
+    """The chain with the ends that a tree comes to, which starts the same actions otherwise."""
+    tick = compile_tick(task, root)
+    status = list(chain.status)
+    for number in chain.final:
+        state = chain.states[number]
+        status[number] = NodeStatus(tick(state.values, state.finished))
+    return replace(chain, status=tuple(status))
 
 
-def _with_guards(task: Task, root: Node, tests: frozenset[str] = frozenset()) -> Node:
-    """Guards at all actions but ``tests``, before which stands a test that is never unknown: it fails where
-    a guard would be running."""
-    fresh = _fresh(root)
-    # Bottom-up and iterative: trees may be deep.
-    done: dict[int, Node] = {}
-    for node in reversed(list(walk(root))):
-        new = node
-        if isinstance(node, ControlNode):
-            new = replace(node, children=tuple([done[id(child)] for child in node.children]))
-        elif isinstance(node, ActionNode):
-            needed = task.action_by_name[node.action].precondition
-            new = replace(node, guarded=needed != TRUE and node.id not in tests)
-            if needed != TRUE and node.id in tests:
-                test = ConditionNode(next(fresh), _surely(task, needed))
-                new = ControlNode(next(fresh), "sequence", (test, new))
-        done[id(node)] = new
-    return done[id(root)]
+@dataclass(slots=True)
+class _Guarding:
+    """A walk through a tree, with what is sure at each node."""
+
+    task: Task
+    facts: Facts
+    fresh: Iterator[str]
+    kept: bool = False
+    """Here guards stay as they are: templates keep the form that their author gave them."""
+
+    def node(self, node: Node, last: _Last, *, bounded: bool = False) -> Node:
+        """The node with guards; ``bounded``: it stands below a retry node."""
+        match node:
+            case ConditionNode():
+                return node
+            case ActionNode():
+                return self._action(node, test=bounded and not last.of_retry and not node.latched)
+            case ControlNode(template=str()):
+                with self._inside_template():
+                    return self._control(node, last, bounded=bounded)
+            case ControlNode():
+                return self._control(node, last, bounded=bounded)
+            case _:
+                assert_never(node)
+
+    def _control(self, node: ControlNode, last: _Last, *, bounded: bool) -> Node:
+        if node.kind == "retry":
+            (child,) = node.children
+            return replace(node, children=(self.node(child, _Last(last.of_all, last.of_all), bounded=True),))
+        children: list[Node] = []
+        with self.facts.meanwhile():
+            for at, child in enumerate(node.children):
+                rest = node.children[at + 1 :] if node.kind == "fallback" else ()
+                children.append(self.node(child, self._last(last, rest, bounded), bounded=bounded))
+                self.facts.add(returned(self.task, children[-1], GO_ON[node.kind], bounded=bounded))
+        return replace(node, children=tuple(children))
+
+    @contextmanager
+    def _inside_template(self) -> Iterator[None]:
+        around, self.kept = self.kept, True
+        yield
+        self.kept = around
+
+    def _action(self, node: ActionNode, *, test: bool) -> Node:
+        needed = self.task.action_by_name[node.action].precondition
+        if self.facts.sure(needed):
+            return node if self.kept else replace(node, guarded=False)
+        if node.guarded:
+            return node
+        if not test or self.facts.never_unknown(needed):
+            return replace(node, guarded=True)
+        condition = ConditionNode(next(self.fresh), _surely(self.task, needed))
+        return ControlNode(next(self.fresh), "sequence", (condition, node))
+
+    def _last(self, last: _Last, rest: Sequence[Node], bounded: bool) -> _Last:
+        for node in rest:
+            if self.facts.possible(returned(self.task, node, NodeStatus.SUCCESS, bounded=bounded)):
+                return _Last(of_all=False, of_retry=False)
+            if any(actions_of(node)):
+                last = _Last(of_all=False, of_retry=last.of_retry)
+        return last
+
+
+@dataclass(frozen=True, slots=True)
+class _Last:
+    """Does nothing have its turn after an action that fails since its attempts are used up: nothing at all,
+    nothing but what the same retry nodes refuse."""
+
+    of_all: bool = True
+    of_retry: bool = True
 
 
 def _surely(task: Task, condition: Condition) -> Condition:
@@ -87,14 +154,13 @@ def _fresh(root: Node) -> Iterator[str]:
 
 
 def _with_goal(task: Task, root: Node) -> Node:
-    parts = conjuncts(task.goal)
-    open_ended = isinstance(root, ControlNode) and root.kind == "sequence" and root.template is None
-    children = root.children if isinstance(root, ControlNode) and open_ended else (root,)
-    last = children[max(0, len(children) - len(parts)) :]
-    if tuple([each.condition for each in last if isinstance(each, ConditionNode)]) == parts:
+    facts = Facts(task)
+    facts.add(returned(task, root, NodeStatus.SUCCESS))
+    missing = [part for part in conjuncts(task.goal) if not facts.sure(part)]
+    if not missing:
         return root
     fresh = _fresh(root)
-    checks = [ConditionNode(next(fresh), part) for part in parts]
-    if isinstance(root, ControlNode) and open_ended:
-        return replace(root, children=(*children, *checks))
+    checks = [ConditionNode(next(fresh), part) for part in missing]
+    if isinstance(root, ControlNode) and root.kind == "sequence" and root.template is None:
+        return replace(root, children=(*root.children, *checks))
     return ControlNode(next(fresh), "sequence", (root, *checks))

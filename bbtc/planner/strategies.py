@@ -75,13 +75,10 @@ def require_strategy(name: str, options: Options) -> None:
 def run_strategy(
     name: str, task: Task, target: Fraction, *, limits: Limits, progress: Progress, options: Options
 ) -> Plan:
-    """Plan with a strategy. Raises :class:`BbtcError` as :func:`require_strategy` does."""
+    """Plan with a strategy, but for guards. Raises :class:`BbtcError` as :func:`require_strategy` does."""
     require_strategy(name, options)
-    from bbtc.planner.guard import guarded, most_more
+    if not options.closed_world:
+        from bbtc.planner.guard import most_more
 
-    # Strategies need not know of guards: they change nothing in the simulation.
-    unguarded = replace(options, guarded=False)
-    if options.guarded:
-        limits = replace(limits, nodes=max(1, limits.nodes - most_more(task)))
-    plan = STRATEGIES[name].load()(task, target, limits, progress, unguarded)
-    return guarded(plan, limits) if options.guarded else plan
+        limits = replace(limits, nodes=max(min(1, limits.nodes), limits.nodes - most_more(task)))
+    return STRATEGIES[name].load()(task, target, limits, progress, options)

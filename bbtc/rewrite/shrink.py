@@ -29,7 +29,13 @@ _MOST_STATES = 50_000
 
 
 def shrunk(
-    task: Task, root: Node, target: Fraction, limits: Limits, transitions: dict[str, Transition] | None = None
+    task: Task,
+    root: Node,
+    target: Fraction,
+    limits: Limits,
+    transitions: dict[str, Transition] | None = None,
+    *,
+    closed_world: bool = False,
 ) -> Node:
     """The tree without those alternatives of its Fallbacks that the target does not need: one after
     the other is dropped, the largest first, as long as the exact success probability stays at the
@@ -55,7 +61,7 @@ def shrunk(
                 continue
             work += len(other.states)
             if _Worth.of(other).will_do(before, target) and not violations(task, other):
-                root = simplified(task, smaller, limits, transitions)
+                root = simplified(task, smaller, limits, transitions, closed_world=closed_world)
                 dropped = True
                 break
     return root

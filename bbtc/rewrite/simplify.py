@@ -1,7 +1,8 @@
 """Smaller trees that do the same: no simplification changes what happens in any run.
 
 Rewrite rules, for a control node k (Sequence, Fallback or Skipper). What a node ever returns is read off
-every state that a run can visit; with "goes on" for the status after which k ticks its next child:
+every state that a run can visit, or, where others may change the world, worked out for any state
+(:mod:`bbtc.rewrite.ensured`); with "goes on" for the status after which k ticks its next child:
 
 1. ``k(…, c, …)`` becomes ``k(…, …)`` if c never does anything but go on, or is never ticked (as what stands
    behind a child that never goes on).
@@ -15,13 +16,16 @@ side, do the same (:mod:`bbtc.belief.same_runs`); k is a Sequence or a Fallback 
    stands among its neighbours.
 5. ``k(…, j(x…, a), j(y…, a), …)`` becomes ``k(…, j(k(j(x…), j(y…)), a), …)`` for an action a, likewise.
 
+Where others may change the world, a stands first in rule 4 and last in rule 5: the rules hold in any state
+then.
+
 Rules 1 to 3 are applied until nothing changes, then one of 4 and 5, and so on. The result as a whole is
 compared with the tree given, in the same way. Templates keep the shape that their author gave them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from operator import is_
 
@@ -32,14 +36,8 @@ from bbtc.belief.tick import NodeStatus, compile_tick
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.rewrite.ensured import GO_ON, may_return
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of, walk
-
-GOES_ON: dict[ControlKind, NodeStatus] = {
-    "sequence": NodeStatus.SUCCESS,
-    "fallback": NodeStatus.FAILURE,
-    "skipper": NodeStatus.RUNNING,
-}
-"""After which status of a child a control node ticks the next one."""
 
 _MOST_TICKS = 200_000
 """Ticks spent on trying merged trees, each time."""
@@ -52,10 +50,16 @@ _MOST_STATES = 20_000
 
 
 def simplified(
-    task: Task, root: Node, limits: Limits, transitions: dict[str, Transition] | None = None
+    task: Task,
+    root: Node,
+    limits: Limits,
+    transitions: dict[str, Transition] | None = None,
+    *,
+    closed_world: bool = False,
 ) -> Node:
-    """The tree made smaller, its runs unchanged. Raises ``LimitReached``; ``AssertionError`` if what
-    was found does something else, which is a bug."""
+    """The tree made smaller, its runs unchanged; but in a ``closed_world``, also those that begin where
+    others have changed something. Raises ``LimitReached``; ``AssertionError`` if what was found does
+    something else, which is a bug."""
     try:
         chain = explore(task, root, replace(limits, states=min(limits.states, _MOST_STATES)), transitions)
     except LimitReached:
@@ -63,9 +67,12 @@ def simplified(
         return root
     found = root
     while True:
-        own = chain if found is root else explore(task, found, limits, transitions)
-        smaller = _without_idle(task, found, own, limits)
-        shared = _shared(task, smaller, chain, limits)
+        if closed_world:
+            own = chain if found is root else explore(task, found, limits, transitions)
+            smaller = _without_idle(found, _returned(task, found, own, limits))
+        else:
+            smaller = _without_idle(found, may_return(task, found))
+        shared = _shared(task, smaller, chain, limits, closed_world=closed_world)
         if shared is None:
             break
         found = shared
@@ -130,16 +137,15 @@ def without_idle_branches(task: Task, root: Node, chain: Chain, limits: Limits) 
     return kept(root)
 
 
-def _without_idle(task: Task, root: Node, chain: Chain, limits: Limits) -> Node:
+def _without_idle(root: Node, returned: Mapping[str, Set[int]]) -> Node:
     """Rules 1 to 3, until nothing more is found."""
-    returned = _returned(task, root, chain, limits)
 
     def kept(node: Node) -> Node:
         if not isinstance(node, ControlNode) or node.template is not None:
             return node
         if node.kind == "retry":
             return replace(node, children=(kept(node.children[0]),))
-        goes_on = GOES_ON[node.kind]
+        goes_on = GO_ON[node.kind]
         children: list[Node] = []
         for child in node.children:
             if returned[child.id] - {goes_on}:  # else rule 1
@@ -162,9 +168,9 @@ def _dissolved(kind: ControlKind, child: Node) -> Sequence[Node]:
 # --- what stands twice: rules 4 and 5 --------------------------------------------------------
 
 
-def _shared(task: Task, root: Node, chain: Chain, limits: Limits) -> Node | None:
+def _shared(task: Task, root: Node, chain: Chain, limits: Limits, *, closed_world: bool) -> Node | None:
     """Rule 4 or 5, once: the first smaller tree that does the same; None if there is none."""
-    for tried, smaller in enumerate(_merged(root)):
+    for tried, smaller in enumerate(_merged(root, anywhere=closed_world)):
         limits.check_time("the search for a small tree")
         if tried * len(chain.states) > _MOST_TICKS:
             break
@@ -173,27 +179,34 @@ def _shared(task: Task, root: Node, chain: Chain, limits: Limits) -> Node | None
     return None
 
 
-def _merged(node: Node) -> Iterator[Node]:
-    """Trees with two neighbours merged, which may or may not do the same."""
+def _merged(node: Node, *, anywhere: bool) -> Iterator[Node]:
+    """Trees with two neighbours merged, which may or may not do the same; ``anywhere``: what they share
+    stands anywhere among its neighbours."""
     if not isinstance(node, ControlNode) or node.template is not None:
         return
     if node.kind in {"fallback", "sequence"}:
         inner: ControlKind = "sequence" if node.kind == "fallback" else "fallback"
         for at in range(len(node.children) - 1):
-            for merged in _pair(node, inner, node.children[at], node.children[at + 1]):
+            for merged in _pair(node, inner, node.children[at : at + 2], anywhere=anywhere):
                 children = (*node.children[:at], merged, *node.children[at + 2 :])
                 yield merged if len(children) == 1 else replace(node, children=children)
     for at, child in enumerate(node.children):
-        for smaller in _merged(child):
+        for smaller in _merged(child, anywhere=anywhere):
             yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))
 
 
-def _pair(above: ControlNode, inner: ControlKind, one: Node, other: Node) -> Iterator[Node]:
+def _pair(
+    above: ControlNode, inner: ControlKind, neighbours: Sequence[Node], *, anywhere: bool
+) -> Iterator[Node]:
+    one, other = neighbours
     first, second = _parts(inner, one), _parts(inner, other)
     if isinstance(other, ControlNode) and len(second) > 1:
         for part in first:
             for twin in second:
                 if isinstance(part, ControlNode) or not _same(part, twin):
+                    continue
+                end = 0 if isinstance(part, ConditionNode) else -1
+                if not anywhere and not (part is first[end] and twin is second[end]):
                     continue
                 rest = [
                     _control(other, inner, [c for c in side if c is not p])
@@ -204,9 +217,12 @@ def _pair(above: ControlNode, inner: ControlKind, one: Node, other: Node) -> Ite
                 choice = ControlNode(
                     f"{other.id}.or", above.kind, tuple(each for each in rest if each is not None)
                 )
-                # Rule 4, else rule 5.
-                order = (part, choice) if isinstance(part, ConditionNode) else (choice, part)
-                yield replace(other, kind=inner, children=order)
+                if isinstance(part, ActionNode) and isinstance(twin, ActionNode):  # rule 5
+                    # A guard is kept: where there is none, it would hold.
+                    action = replace(part, guarded=part.guarded or twin.guarded)
+                    yield replace(other, kind=inner, children=(choice, action))
+                else:  # rule 4
+                    yield replace(other, kind=inner, children=(part, choice))
 
 
 def _parts(kind: ControlKind, node: Node) -> tuple[Node, ...]:
@@ -227,12 +243,7 @@ def _same(one: Node, other: Node) -> bool:
         case ConditionNode(), ConditionNode():
             return one.condition == other.condition
         case ActionNode(), ActionNode():
-            return (
-                one.action == other.action
-                and not one.latched
-                and not other.latched
-                and one.guarded == other.guarded
-            )
+            return one.action == other.action and not one.latched and not other.latched
         case ControlNode(), ControlNode():
             return (
                 one.kind == other.kind != "retry"

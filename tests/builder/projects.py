@@ -36,7 +36,7 @@ def project(folder: Path, manifest: str, **sources: str) -> Path:
 
 def several(folder: Path, count: int, exports: str = "[dot]", per_domain: int = 5) -> Path:
     """A project of so many trees; each domain is shared by a few."""
-    lines = ["defaults:", f"  exports: {exports}", "  target: 0.75", "trees:"]
+    lines = ["defaults:", f"  exports: {exports}", "  target: 0.75", "  retries: least", "trees:"]
     sources = {}
     for number in range(count):
         domain = f"d{number // per_domain}"

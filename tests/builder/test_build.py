@@ -50,6 +50,7 @@ def run(folder: Path, *names: str, **options: Any) -> BuildReport:
 def test_a_build_makes_what_the_commands_make(tmp_path: Path) -> None:
     manifest = (
         "trees:\n  coin:\n    domain: coin.pddl\n    target: 0.75\n    strategy: policy\n"
+        "    retries: least\n"
         "    exports: {btcpp: , py_trees: robot/coin.py, big: {format: dot, options: {legend: true}}}\n"
         "    expect: [success == 3/4, actions == 3/2, nodes < 9]\n"
     )
@@ -57,7 +58,7 @@ def test_a_build_makes_what_the_commands_make(tmp_path: Path) -> None:
     done = bbtc(folder, "build")
     assert done.returncode == 0, done.stderr
     assert "coin: success 3/4 (0.75)" in done.stderr
-    plan = ["plan", "coin.pddl", "--target", "0.75", "--strategy", "policy", "-q"]
+    plan = ["plan", "coin.pddl", "--target", "0.75", "--strategy", "policy", "--retries", "least", "-q"]
     assert bbtc(folder, *plan, "-o", "tree.json").returncode == 0
     assert (folder / "build/coin.tree.json").read_text() == (folder / "tree.json").read_text()
     for file, form in {
@@ -358,7 +359,10 @@ def test_the_files_of_a_tree_that_fails_stay_as_they_were(tmp_path: Path) -> Non
 
 
 def test_an_unmet_expectation_shows_its_place_to_machines(tmp_path: Path) -> None:
-    manifest = "trees:\n  coin:\n    domain: coin.pddl\n    target: 0.5\n    expect:\n      - success > 1/2\n"
+    manifest = (
+        "trees:\n  coin: {domain: coin.pddl, target: 0.5, retries: least,\n"
+        "    expect: [\n      cost < 5,\n      actions < 5,\n        success > 1/2]}\n"
+    )
     folder = project(tmp_path, manifest, coin_pddl=COIN)
     (found,) = json.loads(bbtc(folder, "build", "--format", "json").stderr)
     assert (found["code"], found["place"]["file"], found["place"]["startLine"]) == ("BBT1005", "bbtc.yaml", 6)

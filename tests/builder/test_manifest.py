@@ -34,8 +34,9 @@ trees:
     problem: p.pddl
     target: 19/20
     max-actions: 7
-    retries: unbounded
-    guarded: true
+    retries: least
+    prefer: size
+    closed-world: true
     limits: {time: 60, states: 1000}
     exports:
       btcpp: trees/first.xml
@@ -68,8 +69,9 @@ strategy = "auto"
 problem = "p.pddl"
 target = 0.95
 max-actions = 7
-retries = "unbounded"
-guarded = true
+retries = "least"
+prefer = "size"
+closed-world = true
 limits = {time = 60, states = 1000}
 expect = ["success >= 95%", "cost <= 7/2"]
 
@@ -105,9 +107,9 @@ def test_a_full_manifest_is_read() -> None:
     first, second = read(FULL).trees
     assert (first.name, first.inputs, first.file) == ("first", ("d.pddl", "p.pddl"), "out/first.tree.json")
     assert (first.target, first.strategy, first.max_actions) == (Fraction(19, 20), "auto", 7)
-    assert first.guarded
-    assert not second.guarded
-    assert (first.retries, first.limits) == ("unbounded", (("states", 1000), ("seconds", 60)))
+    assert (first.closed_world, second.closed_world) == (True, False)
+    assert (first.prefer, second.prefer, second.retries) == ("size", "success", "unbounded")
+    assert (first.retries, first.limits) == ("least", (("states", 1000), ("seconds", 60)))
     assert [(e.name, e.form, e.file, e.options) for e in first.exports] == [
         ("btcpp", "btcpp", "trees/first.xml", ()),
         ("svg", "svg", "out/first.svg", ()),

@@ -23,7 +23,7 @@ def file(tmp_path: Path) -> Path:
 
 def test_the_last_step_and_the_tree_do_not_differ_without_a_word(file: Path) -> None:
     """Tossed without end it comes up heads for sure; three tosses are enough for 0.8."""
-    done = bbtc("plan", str(file), "--strategy", "search", "--target", "0.8")
+    done = bbtc("plan", str(file), "--strategy", "search", "--retries", "least", "--target", "0.8")
     assert [line.strip() for line in done.err.splitlines()[-4:-1]] == [
         "success 1, 7 nodes",
         "then simplified, with no more attempts than the target takes:",
@@ -57,5 +57,6 @@ def test_chances_that_nobody_knows_are_named(tmp_path: Path) -> None:
 )
 def test_used_up_attempts_are_counted(file: Path, tmp_path: Path, target: str, told: str) -> None:
     tree = str(tmp_path / "tree.json")
-    bbtc("plan", str(file), "--strategy", "search", "--target", target, "-q", "-o", tree)
+    least = ("--strategy", "search", "--retries", "least")
+    bbtc("plan", str(file), *least, "--target", target, "-q", "-o", tree)
     assert told in bbtc("simulate", tree).out.decode()

@@ -28,7 +28,7 @@ SIGNS = {"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻"}
 
 
 def outline(task: Task, node: Node, depth: int = 0) -> str:
-    """A tree as indented text: signs of control nodes, conditions, actions in brackets."""
+    """A tree as indented text: signs of control nodes, conditions, actions in brackets with their guards."""
     indent = "  " * depth
     if isinstance(node, ControlNode):
         attempts = "" if node.attempts is None else f"at most {node.attempts} actions"
@@ -36,7 +36,9 @@ def outline(task: Task, node: Node, depth: int = 0) -> str:
         return f"{indent}{label}\n" + "".join(outline(task, child, depth + 1) for child in node.children)
     if isinstance(node, ConditionNode):
         return f"{indent}{describe(task, node.condition)}\n"
-    return f"{indent}[{node.action}]\n"
+    needed = task.action_by_name[node.action].precondition
+    guard = f" needs {describe(task, needed)}" if node.guarded else ""
+    return f"{indent}[{node.action}]{guard}\n"
 
 
 def fenced(text: str) -> str:

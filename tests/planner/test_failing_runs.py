@@ -113,7 +113,7 @@ def test_a_blocked_run_names_the_empty_battery_and_not_the_fact_it_never_came_to
     """It is enough to find out that nobody is there. In the hall with an empty battery nobody finds out."""
     file = tmp_path / "hospital.pddl"
     file.write_text(HOSPITAL.replace("GOAL", "(or (delivered) (not (nurse-in ward-1)))"))
-    done = bbtc("plan", str(file), "-o", str(tmp_path / "tree.json"), "-q")
+    done = bbtc("plan", str(file), "--closed-world", "-o", str(tmp_path / "tree.json"), "-q")
     battery = "needs charged(), and no action brings it back: charge() can never do so"
     assert done.err.replace(f"{tmp_path}/", "").splitlines()[-3:] == [
         f"    drive(hall,ward-1) [hospital.pddl:8:3] {battery}",
@@ -152,7 +152,7 @@ def test_attempts_used_up_lose_nothing_for_good(tmp_path: Path) -> None:
           (:action toss :precondition (not (heads)) :effect (probabilistic 1/2 (heads))))
         (define (problem three) (:domain coin) (:init) (:goal (heads)) (:goal-probability 0.8))"""
     )
-    bbtc("plan", str(file), "-q", "-o", str(tmp_path / "tree.json"))
+    bbtc("plan", str(file), "--retries", "least", "-q", "-o", str(tmp_path / "tree.json"))
     lines = bbtc("simulate", str(tmp_path / "tree.json")).out.decode().splitlines()
     assert lines[-4] == (
         "  1/8 (0.125): all 3 attempts used up, node n3: "

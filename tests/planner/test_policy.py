@@ -25,7 +25,7 @@ from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import horizon_values
 from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.ssp import least_cost
-from bbtc.planner.options import DEFAULTS, Options
+from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.planner.synthesis.permissive import likely_policy
 from bbtc.planner.synthesis.rules import Literal, Rule
@@ -42,7 +42,7 @@ from tests.strategies import tasks
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 
 
-UNBOUNDED = Options(retries="unbounded")
+UNBOUNDED, LEAST = Options(retries="unbounded"), Options(retries="least")
 
 
 def plan(
@@ -146,7 +146,7 @@ def test_the_best_choice_may_change_as_the_budget_runs_out() -> None:
 def test_an_action_is_tried_as_often_as_the_target_takes() -> None:
     again = action("again", Is(0, F), ("1/2", {0: T}), ("1/2", {}))
     of = task("a", {}, Is(0, T), again)
-    done = plan(of, "0.9", options=DEFAULTS)
+    done = plan(of, "0.9", options=LEAST)
     assert [attempts for _, attempts in retries_of(done.tree.root)] == [4]
     assert done.tree.success_probability == 1 - Fraction(1, 2) ** 4
     assert list(retries_of(plan(of, "0.9", options=UNBOUNDED).tree.root)) == []
@@ -154,7 +154,7 @@ def test_an_action_is_tried_as_often_as_the_target_takes() -> None:
 
 def test_where_no_number_of_tries_is_enough_there_is_no_bound() -> None:
     again = action("again", Is(0, F), ("1/2", {0: T}), ("1/2", {}))
-    done = plan(task("a", {}, Is(0, T), again), "1", options=DEFAULTS)
+    done = plan(task("a", {}, Is(0, T), again), "1", options=LEAST)
     assert (done.tree.status, done.tree.success_probability) == ("target-reached", 1)
     assert list(retries_of(done.tree.root)) == []
 
@@ -162,7 +162,7 @@ def test_where_no_number_of_tries_is_enough_there_is_no_bound() -> None:
 @examples(150)
 @given(of=tasks(), target=st.sampled_from(["1/3", "0.9", "0.999"]))
 def test_one_attempt_less_would_miss_the_target(of: Task, target: str) -> None:
-    done = plan(of, target, options=DEFAULTS)
+    done = plan(of, target, options=LEAST)
     best = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert best is not None
     assert done.tree.success_probability <= best

@@ -37,10 +37,14 @@ def idle(of: Task, root: Node) -> Node:
 
 
 def simple(of: Task, root: Node) -> Node:
+    return simplified(of, root, Limits(), closed_world=True)
+
+
+def simple_anywhere(of: Task, root: Node) -> Node:
     return simplified(of, root, Limits())
 
 
-@pytest.mark.parametrize("simplification", [idle, simple])
+@pytest.mark.parametrize("simplification", [idle, simple, simple_anywhere])
 @examples(80)
 @given(data=st.data())
 def test_no_simplification_changes_a_run(
@@ -83,7 +87,7 @@ def test_what_is_dropped_does_not_cost_the_target(data: st.DataObject, target: s
     if violations(of, explore(of, root, Limits())):
         return
     before = simulate(of, root, Limits())
-    smaller = shrunk(of, root, Fraction(target), Limits())
+    smaller = shrunk(of, root, Fraction(target), Limits(), closed_world=data.draw(st.booleans()))
     after = simulate(of, smaller, Limits())
     assert after.success >= min(before.success, Fraction(target))
     assert size(smaller) <= size(root)

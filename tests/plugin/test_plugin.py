@@ -16,6 +16,7 @@ MANIFEST = """trees:
   coin:
     domain: coin.pddl
     target: 0.75
+    retries: least
     exports: [btcpp, py_trees, dot]
     expect: [success >= 0.75, actions <= 2]
 """

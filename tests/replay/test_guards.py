@@ -1,4 +1,4 @@
-"""Guarded trees and those of ``refine`` in worlds that others change, from the text on: no action starts
+"""Trees in worlds that others change, from the text on: no action starts
 without its precondition, and the root does not succeed without the goal.
 
 The worlds hold every fact of the text, also those that the model never changes or only makes true; what
@@ -30,7 +30,7 @@ from tests.replay.all_engines import Compared
 ENGINES: list[Callable[[Tree], Replay]] = [lambda tree: PyTreesReplay(tree, "imported")]
 if importlib.util.find_spec("behaviortreepy") is not None:  # there is no wheel of it for some platforms
     ENGINES.append(BtcppReplay)
-PLANS = [("refine", Options()), *((name, Options(guarded=True)) for name in STRATEGIES)]
+PLANS = [*((name, Options()) for name in STRATEGIES), ("refine", Options(closed_world=True))]
 GROUP = 40
 RUNS = 6
 TICKS = 25
@@ -93,7 +93,7 @@ class RestlessWorld:
 
 
 @pytest.mark.parametrize("group", range(amount(2, 60)))
-@pytest.mark.parametrize("plan", PLANS, ids=lambda plan: f"{plan[0]}{'-guarded' * plan[1].guarded}")
+@pytest.mark.parametrize("plan", PLANS, ids=lambda plan: f"{plan[0]}{'-closed' * plan[1].closed_world}")
 def test_no_action_starts_and_no_root_succeeds_where_the_text_forbids_it(
     plan: tuple[str, Options], group: int, record_property: Callable[[str, object], None]
 ) -> None:

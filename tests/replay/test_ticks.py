@@ -82,7 +82,7 @@ def test_plans_run_as_in_the_reference_whatever_changes(
             compared.add(trees=1)
 
 
-@pytest.mark.parametrize("options", [None, Options(guarded=True)], ids=["refine", "guarded"])
+@pytest.mark.parametrize("options", [None, Options()], ids=["refine", "guarded"])
 @pytest.mark.parametrize("problem", QUICK, ids=str)
 def test_plans_are_sound_whatever_changes(problem: Problem, options: Options | None) -> None:
     tree, rng = plan_of(problem, "refine").tree, random.Random(1)

@@ -33,7 +33,7 @@ from bbtc.watch import importing
 if TYPE_CHECKING:
     from bbtc.ground.task import Task
     from bbtc.limits import Limits
-    from bbtc.planner.options import Options, Retries
+    from bbtc.planner.options import Options, Prefer, Retries
     from bbtc.planner.result import Plan, Refinement
     from bbtc.planner.why_not import DeadEnd
 
@@ -50,16 +50,24 @@ _TELLING = 1.0
 @click.option("--max-actions", type=Count(0), metavar="K", help="Let no run take more actions.")
 @click.option(
     "--retries",
-    type=click.Choice(["least", "unbounded"]),
-    default="least",
+    type=click.Choice(["unbounded", "least"]),
+    default="unbounded",
     show_default=True,
-    help=f"Try again as often as the target takes, or without end ({others(lambda each: each.retries)}).",
+    help=f"Try again without end, or as often as the target takes ({others(lambda each: each.retries)}).",
 )
 @click.option(
-    "--guarded",
-    is_flag=True,
-    help="Keep the checks that matter only where others change the world, too.",
+    "--prefer",
+    type=click.Choice(["success", "cost", "size"]),
+    default="success",
+    show_default=True,
+    help="Of trees that meet the target: the one of most success, least cost, or fewest nodes.",
 )
+@click.option(
+    "--closed-world",
+    is_flag=True,
+    help="Leave out what is read only in case that others change the world, too.",
+)
+@click.option("--guarded", is_flag=True, help="The contrary of --closed-world, and the default.")
 @click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
 @click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
 @click.option("--verify", "verified", is_flag=True, help="Write the tree only if `bbtc verify` takes it.")
@@ -75,6 +83,8 @@ def command(
     strategy: str,
     max_actions: int | None,
     retries: Retries,
+    prefer: Prefer,
+    closed_world: bool,
     guarded: bool,
     bounds: bool,
     as_json: bool,
@@ -100,8 +110,10 @@ def command(
 
     if as_json and not bounds:
         raise click.UsageError("--json goes with --bounds: a tree is always written as JSON.")
+    if closed_world and guarded:
+        raise click.UsageError("--closed-world and --guarded contradict each other.")
     limits = session.limits
-    options = Options(max_actions=max_actions, retries=retries, guarded=guarded)
+    options = Options(max_actions, retries, prefer, closed_world)
     require_strategy(strategy, options if not bounds else DEFAULTS)
     session.expect_output(output, files, check=check and not bounds, depfile=None if bounds else depfile)
     task = load_task(session, files, limits)

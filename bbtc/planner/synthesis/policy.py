@@ -138,8 +138,10 @@ class _Search:
                 done = True
         if not done:
             self._keep(in_phases(self.task, [(part.steps, part.policy) for part in parts], self.limits))
-        simple = simplified(self.task, self.best.root, self.limits)
-        self._keep(numbered(shrunk(self.task, simple, self.target, self.limits)))
+        closed = self.options.closed_world
+        simple = simplified(self.task, self.best.root, self.limits, closed_world=closed)
+        wanted = self.target if self.options.prefer == "size" else self.best.success
+        self._keep(numbered(shrunk(self.task, simple, wanted, self.limits, closed_world=closed)))
 
     def _keep(self, root: Node, limits: Limits | None = None) -> None:
         """Take a tree for the best so far, unless it does worse and does not reach the target."""

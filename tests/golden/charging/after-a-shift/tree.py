@@ -1,6 +1,7 @@
 """Behavior tree for the problem after-a-shift of the domain charging. Made by bbtc.
 
-In the model of that domain it succeeds with probability 7610591151/8000000000.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -21,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector, Sequence
+from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -186,60 +187,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
-class Skipper(Composite):
-    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
-
-    def tick(self) -> Iterator[Behaviour]:
-        status = Status.RUNNING
-        for child in self.children:
-            yield from child.tick()
-            self.current_child = child
-            status = child.status
-            if status != Status.RUNNING:
-                break
-        if status != Status.RUNNING:
-            for child in self.children:
-                if child is not self.current_child and child.status != Status.INVALID:
-                    child.stop(Status.INVALID)
-            self.stop(status)
-        self.status = status
-        yield self
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -248,16 +195,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def skipper(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children are running. Every tick starts at the first child."""
-    return Skipper(name, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -370,64 +307,86 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            10,
-            fallback(
-                "fallback",
-                skipper(
-                    "skipper",
-                    Condition(
-                        "(patrolled(lobby) and docked())",
-                        lambda: all_of(robot.patrolled("lobby"), robot.docked()),
-                    ),
-                    Try("check_charger()", robot.check_charger, robot.cancel, keep=False),
+        fallback(
+            "fallback",
+            Condition(
+                "(patrolled(lobby) and known docked() and docked())",
+                lambda: all_of(
+                    robot.patrolled("lobby"),
+                    robot.docked() is not None,
+                    robot.docked(),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                    fallback(
-                        "fallback",
-                        sequence(
-                            "sequence",
-                            Condition("not at(lobby)", lambda: negated(robot.at("lobby"))),
-                            Try(
-                                "dock(station)",
-                                lambda: robot.dock("station"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        Try(
-                            "return_to_dock(station)",
-                            lambda: robot.return_to_dock("station"),
-                            robot.cancel,
-                            keep=False,
-                        ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and unknown docked())",
+                    lambda: all_of(robot.at("station"), robot.docked() is None),
+                ),
+                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and known docked() and not docked() and patrol…",
+                    lambda: all_of(
+                        robot.at("station"),
+                        robot.docked() is not None,
+                        negated(robot.docked()),
+                        robot.patrolled("lobby"),
                     ),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("at(lobby)", lambda: robot.at("lobby")),
-                    Try("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel, keep=False),
+                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                Latch(
+                    "return_to_dock(station)",
+                    lambda: robot.return_to_dock("station"),
+                    robot.cancel,
+                    keep=False,
                 ),
-                sequence(
-                    "sequence",
-                    Condition("not battery(low)", lambda: negated(robot.battery("low"))),
-                    Try("drive(lobby)", lambda: robot.drive("lobby"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "scan(lobby)",
+                lambda: robot.scan("lobby"),
+                robot.cancel,
+                guard=lambda: robot.at("lobby"),
+                keep=False,
+            ),
+            Latch(
+                "drive(lobby)",
+                lambda: robot.drive("lobby"),
+                robot.cancel,
+                guard=lambda: negated(robot.battery("low")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known docked() and docked())",
+                    lambda: all_of(robot.docked() is not None, robot.docked()),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("known docked()", lambda: robot.docked() is not None),
-                    Condition("docked()", robot.docked),
-                    Try("charge()", robot.charge, robot.cancel, keep=False),
+                Latch("charge()", robot.charge, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and known docked() and not docked())",
+                    lambda: all_of(
+                        robot.at("station"),
+                        robot.docked() is not None,
+                        negated(robot.docked()),
+                    ),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("unknown docked()", lambda: robot.docked() is None),
-                    Try("check_charger()", robot.check_charger, robot.cancel, keep=False),
-                ),
-                Try("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
+                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "return_to_dock(station)",
+                lambda: robot.return_to_dock("station"),
+                robot.cancel,
+                keep=False,
             ),
         ),
         READS,
@@ -538,6 +497,7 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 READS: dict[Fact, bool] = {
     ("at", "lobby"): False,
+    ("at", "station"): False,
     ("battery", "low"): False,
     ("docked",): True,
     ("patrolled", "lobby"): False,

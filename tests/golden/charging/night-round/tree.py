@@ -1,6 +1,7 @@
 """Behavior tree for the problem night-round of the domain charging. Made by bbtc.
 
-In the model of that domain it succeeds with probability 9017001/10000000.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -21,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector, Sequence
+from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -74,6 +75,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -179,60 +187,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
-class Skipper(Composite):
-    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
-
-    def tick(self) -> Iterator[Behaviour]:
-        status = Status.RUNNING
-        for child in self.children:
-            yield from child.tick()
-            self.current_child = child
-            status = child.status
-            if status != Status.RUNNING:
-                break
-        if status != Status.RUNNING:
-            for child in self.children:
-                if child is not self.current_child and child.status != Status.INVALID:
-                    child.stop(Status.INVALID)
-            self.stop(status)
-        self.status = status
-        yield self
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -241,16 +195,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def skipper(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children are running. Every tick starts at the first child."""
-    return Skipper(name, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -359,124 +303,163 @@ def run(root: Behaviour, period: float = 0.0) -> Status:
             root.stop(Status.INVALID)
 
 
-def branch_1(robot: Robot) -> Behaviour:
-    return fallback(
-        "fallback",
-        Condition("at(station)", lambda: robot.at("station")),
-        Try(
-            "return_to_dock(station)",
-            lambda: robot.return_to_dock("station"),
-            robot.cancel,
-            keep=False,
-        ),
-    )
-
-
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            12,
+        fallback(
+            "fallback",
+            Condition(
+                "(patrolled(lobby) and patrolled(store) and patrolled(worksh…",
+                lambda: all_of(
+                    robot.patrolled("lobby"),
+                    robot.patrolled("store"),
+                    robot.patrolled("workshop"),
+                ),
+            ),
             sequence(
                 "sequence",
-                fallback(
-                    "fallback",
-                    Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            Condition("at(lobby)", lambda: robot.at("lobby")),
-                            Try(
-                                "drive(lobby)",
-                                lambda: robot.drive("lobby"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        Try("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel, keep=False),
+                Condition("patrolled(store)", lambda: robot.patrolled("store")),
+                Latch(
+                    "scan(workshop)",
+                    lambda: robot.scan("workshop"),
+                    robot.cancel,
+                    guard=lambda: robot.at("workshop"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(patrolled(lobby) and patrolled(store))",
+                    lambda: all_of(robot.patrolled("lobby"), robot.patrolled("store")),
+                ),
+                Latch(
+                    "drive(workshop)",
+                    lambda: robot.drive("workshop"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.battery("low")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known docked() and docked() and patrolled(lobby))",
+                    lambda: all_of(
+                        robot.docked() is not None,
+                        robot.docked(),
+                        robot.patrolled("lobby"),
                     ),
                 ),
-                fallback(
-                    "fallback",
-                    Condition("patrolled(store)", lambda: robot.patrolled("store")),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            Condition("at(store)", lambda: robot.at("store")),
-                            Try(
-                                "drive(store)",
-                                lambda: robot.drive("store"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        Try("scan(store)", lambda: robot.scan("store"), robot.cancel, keep=False),
+                Latch("charge()", robot.charge, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and unknown docked() and patrolled(store))",
+                    lambda: all_of(
+                        robot.at("station"),
+                        robot.docked() is None,
+                        robot.patrolled("store"),
                     ),
                 ),
-                fallback(
-                    "fallback",
-                    Condition("patrolled(workshop)", lambda: robot.patrolled("workshop")),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            Condition("at(workshop)", lambda: robot.at("workshop")),
-                            sequence(
-                                "sequence",
-                                fallback(
-                                    "fallback",
-                                    Condition(
-                                        "not battery(low)",
-                                        lambda: negated(robot.battery("low")),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        fallback(
-                                            "fallback",
-                                            skipper(
-                                                "skipper",
-                                                Condition("docked()", robot.docked),
-                                                Try(
-                                                    "check_charger()",
-                                                    robot.check_charger,
-                                                    robot.cancel,
-                                                    keep=False,
-                                                ),
-                                            ),
-                                            sequence(
-                                                "sequence",
-                                                branch_1(robot),
-                                                Try(
-                                                    "dock(station)",
-                                                    lambda: robot.dock("station"),
-                                                    robot.cancel,
-                                                    keep=False,
-                                                ),
-                                            ),
-                                        ),
-                                        Try("charge()", robot.charge, robot.cancel, keep=False),
-                                    ),
-                                ),
-                                Try(
-                                    "drive(workshop)",
-                                    lambda: robot.drive("workshop"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                        ),
-                        Try(
-                            "scan(workshop)",
-                            lambda: robot.scan("workshop"),
-                            robot.cancel,
-                            keep=False,
-                        ),
+                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and known docked() and not docked() and patrol…",
+                    lambda: all_of(
+                        robot.at("station"),
+                        robot.docked() is not None,
+                        negated(robot.docked()),
+                        robot.patrolled("lobby"),
+                        robot.patrolled("store"),
                     ),
                 ),
+                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(patrolled(lobby) and patrolled(store))",
+                    lambda: all_of(robot.patrolled("lobby"), robot.patrolled("store")),
+                ),
+                Latch(
+                    "return_to_dock(station)",
+                    lambda: robot.return_to_dock("station"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                Latch(
+                    "scan(store)",
+                    lambda: robot.scan("store"),
+                    robot.cancel,
+                    guard=lambda: robot.at("store"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                Latch(
+                    "drive(store)",
+                    lambda: robot.drive("store"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.battery("low")),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "scan(lobby)",
+                lambda: robot.scan("lobby"),
+                robot.cancel,
+                guard=lambda: robot.at("lobby"),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("not battery(half)", lambda: negated(robot.battery("half"))),
+                Latch(
+                    "drive(lobby)",
+                    lambda: robot.drive("lobby"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.battery("low")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known docked() and docked())",
+                    lambda: all_of(robot.docked() is not None, robot.docked()),
+                ),
+                Latch("charge()", robot.charge, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and unknown docked())",
+                    lambda: all_of(robot.at("station"), robot.docked() is None),
+                ),
+                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and known docked() and not docked())",
+                    lambda: all_of(
+                        robot.at("station"),
+                        robot.docked() is not None,
+                        negated(robot.docked()),
+                    ),
+                ),
+                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
             ),
         ),
         READS,
@@ -590,6 +573,7 @@ READS: dict[Fact, bool] = {
     ("at", "station"): False,
     ("at", "store"): False,
     ("at", "workshop"): False,
+    ("battery", "half"): False,
     ("battery", "low"): False,
     ("docked",): True,
     ("patrolled", "lobby"): False,

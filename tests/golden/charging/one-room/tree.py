@@ -1,6 +1,7 @@
 """Behavior tree for the problem one-room of the domain charging. Made by bbtc.
 
-In the model of that domain it succeeds with probability 1179/1250.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -61,6 +62,9 @@ class Robot(Protocol):
     def drive(self, to: str) -> Status:
         """Start or continue drive(to)."""
 
+    def return_to_dock(self, dock: str) -> Status:
+        """Start or continue return_to_dock(dock)."""
+
     def scan(self, room: str) -> Status:
         """Start or continue scan(room)."""
 
@@ -71,6 +75,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -176,40 +187,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -218,11 +195,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -335,33 +307,56 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            7,
-            fallback(
-                "fallback",
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                sequence(
-                    "sequence",
-                    Condition("unknown docked()", lambda: robot.docked() is None),
-                    Try("check_charger()", robot.check_charger, robot.cancel, keep=False),
+        fallback(
+            "fallback",
+            Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+            Latch(
+                "scan(lobby)",
+                lambda: robot.scan("lobby"),
+                robot.cancel,
+                guard=lambda: robot.at("lobby"),
+                keep=False,
+            ),
+            Latch(
+                "drive(lobby)",
+                lambda: robot.drive("lobby"),
+                robot.cancel,
+                guard=lambda: negated(robot.battery("low")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known docked() and docked())",
+                    lambda: all_of(robot.docked() is not None, robot.docked()),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("battery(full)", lambda: robot.battery("full")),
-                    Try("drive(lobby)", lambda: robot.drive("lobby"), robot.cancel, keep=False),
+                Latch("charge()", robot.charge, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and unknown docked())",
+                    lambda: all_of(robot.at("station"), robot.docked() is None),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("docked()", robot.docked),
-                    Try("charge()", robot.charge, robot.cancel, keep=False),
+                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(station) and known docked() and not docked())",
+                    lambda: all_of(
+                        robot.at("station"),
+                        robot.docked() is not None,
+                        negated(robot.docked()),
+                    ),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("not at(lobby)", lambda: negated(robot.at("lobby"))),
-                    Try("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
-                ),
-                Try("scan(lobby)", lambda: robot.scan("lobby"), robot.cancel, keep=False),
+                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "return_to_dock(station)",
+                lambda: robot.return_to_dock("station"),
+                robot.cancel,
+                keep=False,
             ),
         ),
         READS,
@@ -472,7 +467,8 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 READS: dict[Fact, bool] = {
     ("at", "lobby"): False,
-    ("battery", "full"): False,
+    ("at", "station"): False,
+    ("battery", "low"): False,
     ("docked",): True,
     ("patrolled", "lobby"): False,
 }
@@ -525,6 +521,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
             ),
         ],
     ],
+    ("return_to_dock", "station"): [
+        [Outcome("19/20", {("at", "lobby"): False, ("at", "station"): True}), Outcome("1/20", {})],
+    ],
     ("scan", "lobby"): [[Outcome("9/10", {("patrolled", "lobby"): True}), Outcome("1/10", {})]],
 }
 """What each action does: independent choices between outcomes."""
@@ -556,6 +555,9 @@ class SimulatedWorld(World):
 
     def drive(self, to: str) -> Status:
         return self._act("drive", to)
+
+    def return_to_dock(self, dock: str) -> Status:
+        return self._act("return_to_dock", dock)
 
     def scan(self, room: str) -> Status:
         return self._act("scan", room)

@@ -1,6 +1,7 @@
 """Behavior tree for the problem reception-only of the domain delivery. Made by bbtc.
 
-In the model of that domain it succeeds with probability 15840927/16000000.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -65,6 +66,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -170,40 +178,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -212,11 +186,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -329,50 +298,45 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            7,
-            fallback(
-                "fallback",
-                Condition("left(vase,reception)", lambda: robot.left("vase", "reception")),
-                sequence(
-                    "sequence",
-                    Condition("carrying(bill)", lambda: robot.carrying("bill")),
-                    Condition("at(reception)", lambda: robot.at("reception")),
-                    Try(
-                        "leave(bill,reception)",
-                        lambda: robot.leave("bill", "reception"),
-                        robot.cancel,
-                        keep=False,
-                    ),
+        fallback(
+            "fallback",
+            Condition(
+                "(left(vase,reception) and left(bill,reception))",
+                lambda: all_of(robot.left("vase", "reception"), robot.left("bill", "reception")),
+            ),
+            Latch(
+                "leave(vase,reception)",
+                lambda: robot.leave("vase", "reception"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.carrying("vase"),
+                    robot.at("reception"),
+                    robot.staffed("reception"),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("not at(reception)", lambda: negated(robot.at("reception"))),
-                    Try(
-                        "go_to(reception)",
-                        lambda: robot.go_to("reception"),
-                        robot.cancel,
-                        keep=False,
-                    ),
-                ),
-                sequence(
-                    "sequence",
-                    Condition("staffed(reception)", lambda: robot.staffed("reception")),
-                    Try(
-                        "leave(vase,reception)",
-                        lambda: robot.leave("vase", "reception"),
-                        robot.cancel,
-                        keep=False,
-                    ),
-                ),
-                Try(
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("left(bill,reception)", lambda: robot.left("bill", "reception")),
+                Latch(
                     "ring_bell(reception)",
                     lambda: robot.ring_bell("reception"),
                     robot.cancel,
+                    guard=lambda: all_of(
+                        robot.at("reception"),
+                        negated(robot.staffed("reception")),
+                    ),
                     keep=False,
                 ),
             ),
+            Latch(
+                "leave(bill,reception)",
+                lambda: robot.leave("bill", "reception"),
+                robot.cancel,
+                guard=lambda: all_of(robot.carrying("bill"), robot.at("reception")),
+                keep=False,
+            ),
+            Latch("go_to(reception)", lambda: robot.go_to("reception"), robot.cancel, keep=False),
         ),
         READS,
     )
@@ -483,6 +447,8 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 READS: dict[Fact, bool] = {
     ("at", "reception"): False,
     ("carrying", "bill"): False,
+    ("carrying", "vase"): False,
+    ("left", "bill", "reception"): False,
     ("left", "vase", "reception"): False,
     ("staffed", "reception"): False,
 }

@@ -1,6 +1,7 @@
 """Behavior tree for the problem fetch-the-key of the domain doors. Made by bbtc.
 
-In the model of that domain it succeeds with probability 665/729.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -43,11 +44,17 @@ class Robot(Protocol):
     def locked(self, door: str) -> bool | None:
         """Whether locked(door) holds; None where that is unknown."""
 
+    def open(self, door: str) -> bool | None:
+        """Whether open(door) holds."""
+
     def call_control_room(self, door: str) -> Status:
         """Start or continue call_control_room(door)."""
 
     def go_through(self, door: str, arg_from: str, to: str) -> Status:
         """Start or continue go_through(door, arg_from, to)."""
+
+    def try_handle(self, door: str, arg_from: str) -> Status:
+        """Start or continue try_handle(door, arg_from)."""
 
 
 Fact = tuple[str, ...]
@@ -56,6 +63,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 class Condition(Behaviour):
@@ -156,40 +170,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -198,11 +178,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -315,25 +290,61 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            7,
-            fallback(
-                "fallback",
-                Condition("in(lab)", lambda: robot.is_in("lab")),
-                sequence(
-                    "sequence",
-                    Condition("locked(lab_door)", lambda: robot.locked("lab_door")),
-                    Try(
-                        "call_control_room(lab_door)",
-                        lambda: robot.call_control_room("lab_door"),
-                        robot.cancel,
-                        keep=False,
+        fallback(
+            "fallback",
+            Condition("in(lab)", lambda: robot.is_in("lab")),
+            Latch(
+                "go_through(lab_door,hall,lab)",
+                lambda: robot.go_through("lab_door", "hall", "lab"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("hall"), robot.open("lab_door")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known locked(lab_door) and locked(lab_door))",
+                    lambda: all_of(robot.locked("lab_door") is not None, robot.locked("lab_door")),
+                ),
+                Latch(
+                    "call_control_room(lab_door)",
+                    lambda: robot.call_control_room("lab_door"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "go_through(office_door,office,hall)",
+                lambda: robot.go_through("office_door", "office", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("office"), robot.open("office_door")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(unknown locked(office_door) and in(office))",
+                    lambda: all_of(robot.locked("office_door") is None, robot.is_in("office")),
+                ),
+                Latch(
+                    "try_handle(office_door,office)",
+                    lambda: robot.try_handle("office_door", "office"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known locked(office_door) and locked(office_door))",
+                    lambda: all_of(
+                        robot.locked("office_door") is not None,
+                        robot.locked("office_door"),
                     ),
                 ),
-                Try(
-                    "go_through(lab_door,hall,lab)",
-                    lambda: robot.go_through("lab_door", "hall", "lab"),
+                Latch(
+                    "call_control_room(office_door)",
+                    lambda: robot.call_control_room("office_door"),
                     robot.cancel,
                     keep=False,
                 ),
@@ -445,7 +456,15 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
         print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
 
 
-READS: dict[Fact, bool] = {("in", "lab"): False, ("locked", "lab_door"): True}
+READS: dict[Fact, bool] = {
+    ("in", "hall"): False,
+    ("in", "lab"): False,
+    ("in", "office"): False,
+    ("locked", "lab_door"): True,
+    ("locked", "office_door"): True,
+    ("open", "lab_door"): False,
+    ("open", "office_door"): False,
+}
 """The facts that the tree reads, and whether they can be unknown."""
 
 
@@ -455,8 +474,11 @@ INITIAL: list[tuple[str, State]] = [
         {
             ("in", "hall"): True,
             ("in", "lab"): False,
+            ("in", "office"): False,
             ("locked", "lab_door"): True,
+            ("locked", "office_door"): None,
             ("open", "lab_door"): False,
+            ("open", "office_door"): False,
         },
     ),
 ]
@@ -470,8 +492,23 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("2/3", {}),
         ],
     ],
+    ("call_control_room", "office_door"): [
+        [
+            Outcome("1/3", {("locked", "office_door"): False, ("open", "office_door"): True}),
+            Outcome("2/3", {}),
+        ],
+    ],
     ("go_through", "lab_door", "hall", "lab"): [
         [Outcome("1", {("in", "hall"): False, ("in", "lab"): True})],
+    ],
+    ("go_through", "office_door", "office", "hall"): [
+        [Outcome("1", {("in", "hall"): True, ("in", "office"): False})],
+    ],
+    ("try_handle", "office_door", "office"): [
+        [
+            Outcome("3/5", {("locked", "office_door"): False, ("open", "office_door"): True}),
+            Outcome("2/5", {("locked", "office_door"): True}),
+        ],
     ],
 }
 """What each action does: independent choices between outcomes."""
@@ -486,11 +523,17 @@ class SimulatedWorld(World):
     def locked(self, door: str) -> bool | None:
         return self._value("locked", door)
 
+    def open(self, door: str) -> bool | None:
+        return self._value("open", door)
+
     def call_control_room(self, door: str) -> Status:
         return self._act("call_control_room", door)
 
     def go_through(self, door: str, arg_from: str, to: str) -> Status:
         return self._act("go_through", door, arg_from, to)
+
+    def try_handle(self, door: str, arg_from: str) -> Status:
+        return self._act("try_handle", door, arg_from)
 
 
 def main() -> None:

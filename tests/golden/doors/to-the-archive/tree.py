@@ -1,6 +1,7 @@
 """Behavior tree for the problem to-the-archive of the domain doors. Made by bbtc.
 
-In the model of that domain it succeeds with probability 9933/10000.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -46,6 +47,9 @@ class Robot(Protocol):
     def locked(self, door: str) -> bool | None:
         """Whether locked(door) holds; None where that is unknown."""
 
+    def open(self, door: str) -> bool | None:
+        """Whether open(door) holds."""
+
     def go_through(self, door: str, arg_from: str, to: str) -> Status:
         """Start or continue go_through(door, arg_from, to)."""
 
@@ -65,6 +69,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -170,40 +181,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -212,11 +189,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -329,61 +301,65 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            5,
-            fallback(
-                "fallback",
-                Condition("in(archive)", lambda: robot.is_in("archive")),
-                sequence(
-                    "sequence",
-                    Condition(
-                        "known locked(archive_door)",
-                        lambda: robot.locked("archive_door") is not None,
-                    ),
-                    Condition(
-                        "not locked(archive_door)",
-                        lambda: negated(robot.locked("archive_door")),
-                    ),
-                    Try(
-                        "go_through(archive_door,hall,archive)",
-                        lambda: robot.go_through("archive_door", "hall", "archive"),
-                        robot.cancel,
-                        keep=False,
-                    ),
+        fallback(
+            "fallback",
+            Condition("in(archive)", lambda: robot.is_in("archive")),
+            sequence(
+                "sequence",
+                Condition(
+                    "known locked(archive_door)",
+                    lambda: robot.locked("archive_door") is not None,
                 ),
-                sequence(
-                    "sequence",
-                    Condition(
-                        "unknown locked(archive_door)",
-                        lambda: robot.locked("archive_door") is None,
-                    ),
-                    Try(
-                        "try_handle(archive_door,hall)",
-                        lambda: robot.try_handle("archive_door", "hall"),
-                        robot.cancel,
-                        keep=False,
-                    ),
+                Condition(
+                    "not locked(archive_door)",
+                    lambda: negated(robot.locked("archive_door")),
                 ),
-                sequence(
-                    "sequence",
-                    Condition(
-                        "not holding(archive_key)",
-                        lambda: negated(robot.holding("archive_key")),
-                    ),
-                    Try(
-                        "take_key(archive_key,hall)",
-                        lambda: robot.take_key("archive_key", "hall"),
-                        robot.cancel,
-                        keep=False,
-                    ),
-                ),
-                Try(
-                    "unlock(archive_door,archive_key,hall)",
-                    lambda: robot.unlock("archive_door", "archive_key", "hall"),
+                Latch(
+                    "go_through(archive_door,hall,archive)",
+                    lambda: robot.go_through("archive_door", "hall", "archive"),
                     robot.cancel,
+                    guard=lambda: all_of(robot.is_in("hall"), robot.open("archive_door")),
                     keep=False,
                 ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "unknown locked(archive_door)",
+                    lambda: robot.locked("archive_door") is None,
+                ),
+                Latch(
+                    "try_handle(archive_door,hall)",
+                    lambda: robot.try_handle("archive_door", "hall"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.locked("archive_door") is None, robot.is_in("hall")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "not holding(archive_key)",
+                    lambda: negated(robot.holding("archive_key")),
+                ),
+                Latch(
+                    "take_key(archive_key,hall)",
+                    lambda: robot.take_key("archive_key", "hall"),
+                    robot.cancel,
+                    guard=lambda: robot.is_in("hall"),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "unlock(archive_door,archive_key,hall)",
+                lambda: robot.unlock("archive_door", "archive_key", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.locked("archive_door"),
+                    robot.holding("archive_key"),
+                    robot.is_in("hall"),
+                ),
+                keep=False,
             ),
         ),
         READS,
@@ -495,7 +471,9 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 READS: dict[Fact, bool] = {
     ("holding", "archive_key"): False,
     ("in", "archive"): False,
+    ("in", "hall"): False,
     ("locked", "archive_door"): True,
+    ("open", "archive_door"): False,
 }
 """The facts that the tree reads, and whether they can be unknown."""
 
@@ -549,6 +527,9 @@ class SimulatedWorld(World):
 
     def locked(self, door: str) -> bool | None:
         return self._value("locked", door)
+
+    def open(self, door: str) -> bool | None:
+        return self._value("open", door)
 
     def go_through(self, door: str, arg_from: str, to: str) -> Status:
         return self._act("go_through", door, arg_from, to)

@@ -1,6 +1,6 @@
 """Behavior tree for the problem to-the-lab of the domain doors. Made by bbtc.
 
-In the model of that domain it succeeds with probability 547/675.
+In the model of that domain it succeeds with probability 1.
 Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
@@ -63,6 +63,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 class Condition(Behaviour):
@@ -163,40 +170,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -205,11 +178,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -325,81 +293,71 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("in(lab)", lambda: robot.is_in("lab")),
+            Latch(
+                "go_through(lab_door,corridor,lab)",
+                lambda: robot.go_through("lab_door", "corridor", "lab"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("corridor"), robot.open("lab_door")),
+                keep=False,
+            ),
             sequence(
                 "sequence",
-                retry(
-                    "retry",
-                    7,
-                    fallback(
-                        "fallback",
-                        Condition("open(lab_door)", lambda: robot.open("lab_door")),
-                        sequence(
-                            "sequence",
-                            Condition(
-                                "unknown locked(lab_door)",
-                                lambda: robot.locked("lab_door") is None,
-                            ),
-                            fallback(
-                                "fallback",
-                                Condition("in(corridor)", lambda: robot.is_in("corridor")),
-                                sequence(
-                                    "sequence",
-                                    fallback(
-                                        "fallback",
-                                        Condition(
-                                            "open(corridor_door)",
-                                            lambda: robot.open("corridor_door"),
-                                        ),
-                                        sequence(
-                                            "sequence",
-                                            Condition(
-                                                "unknown locked(corridor_door)",
-                                                lambda: robot.locked("corridor_door") is None,
-                                            ),
-                                            Try(
-                                                "try_handle(corridor_door,hall)",
-                                                lambda: robot.try_handle("corridor_door", "hall"),
-                                                robot.cancel,
-                                                keep=False,
-                                            ),
-                                        ),
-                                        Try(
-                                            "call_control_room(corridor_door)",
-                                            lambda: robot.call_control_room("corridor_door"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                    Try(
-                                        "go_through(corridor_door,hall,corridor)",
-                                        lambda: robot.go_through(
-                                            "corridor_door",
-                                            "hall",
-                                            "corridor",
-                                        ),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                            ),
-                            Try(
-                                "try_handle(lab_door,corridor)",
-                                lambda: robot.try_handle("lab_door", "corridor"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        Try(
-                            "call_control_room(lab_door)",
-                            lambda: robot.call_control_room("lab_door"),
-                            robot.cancel,
-                            keep=False,
-                        ),
+                Condition(
+                    "(unknown locked(lab_door) and in(corridor))",
+                    lambda: all_of(robot.locked("lab_door") is None, robot.is_in("corridor")),
+                ),
+                Latch(
+                    "try_handle(lab_door,corridor)",
+                    lambda: robot.try_handle("lab_door", "corridor"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known locked(lab_door) and locked(lab_door))",
+                    lambda: all_of(robot.locked("lab_door") is not None, robot.locked("lab_door")),
+                ),
+                Latch(
+                    "call_control_room(lab_door)",
+                    lambda: robot.call_control_room("lab_door"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "go_through(corridor_door,hall,corridor)",
+                lambda: robot.go_through("corridor_door", "hall", "corridor"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("hall"), robot.open("corridor_door")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(unknown locked(corridor_door) and in(hall))",
+                    lambda: all_of(robot.locked("corridor_door") is None, robot.is_in("hall")),
+                ),
+                Latch(
+                    "try_handle(corridor_door,hall)",
+                    lambda: robot.try_handle("corridor_door", "hall"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known locked(corridor_door) and locked(corridor_door))",
+                    lambda: all_of(
+                        robot.locked("corridor_door") is not None,
+                        robot.locked("corridor_door"),
                     ),
                 ),
                 Latch(
-                    "go_through(lab_door,corridor,lab)",
-                    lambda: robot.go_through("lab_door", "corridor", "lab"),
+                    "call_control_room(corridor_door)",
+                    lambda: robot.call_control_room("corridor_door"),
                     robot.cancel,
                     keep=False,
                 ),
@@ -513,6 +471,7 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 READS: dict[Fact, bool] = {
     ("in", "corridor"): False,
+    ("in", "hall"): False,
     ("in", "lab"): False,
     ("locked", "corridor_door"): True,
     ("locked", "lab_door"): True,

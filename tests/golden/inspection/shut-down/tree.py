@@ -1,6 +1,7 @@
 """Behavior tree for the problem shut-down of the domain inspection. Made by bbtc.
 
-In the model of that domain it succeeds with probability 386589/400000.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -58,6 +59,9 @@ class Robot(Protocol):
     def look_at_valve(self, valve: str, area: str) -> Status:
         """Start or continue look_at_valve(valve, area)."""
 
+    def shake_loose(self, valve: str) -> Status:
+        """Start or continue shake_loose(valve)."""
+
     def switch_lamps_on(self, area: str) -> Status:
         """Start or continue switch_lamps_on(area)."""
 
@@ -71,13 +75,6 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
-
-
-def any_of(*values: bool | None) -> bool | None:
-    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
-    if True in values:
-        return True
-    return None if None in values else False
 
 
 def negated(value: bool | None) -> bool | None:
@@ -183,40 +180,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -250,11 +213,6 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -367,58 +325,72 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            7,
-            fallback(
-                "fallback",
-                skipper(
-                    "skipper",
-                    Condition("closed(drain)", lambda: robot.closed("drain")),
+        fallback(
+            "fallback",
+            skipper(
+                "skipper",
+                Condition("closed(drain)", lambda: robot.closed("drain")),
+                fallback(
+                    "fallback",
                     sequence(
                         "sequence",
-                        fallback(
-                            "fallback",
-                            Condition("at(cellar)", lambda: robot.at("cellar")),
-                            Try(
-                                "drive(cellar)",
-                                lambda: robot.drive("cellar"),
-                                robot.cancel,
-                                keep=False,
-                            ),
+                        Condition("not at(cellar)", lambda: negated(robot.at("cellar"))),
+                        Latch(
+                            "drive(cellar)",
+                            lambda: robot.drive("cellar"),
+                            robot.cancel,
+                            keep=False,
                         ),
-                        fallback(
-                            "fallback",
-                            Condition(
-                                "(lit(cellar) or torch_on())",
-                                lambda: any_of(robot.lit("cellar"), robot.torch_on()),
-                            ),
-                            Try(
-                                "switch_lamps_on(cellar)",
-                                lambda: robot.switch_lamps_on("cellar"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        Try(
+                    ),
+                    sequence(
+                        "sequence",
+                        Condition("lit(cellar)", lambda: robot.lit("cellar")),
+                        Latch(
                             "look_at_valve(drain,cellar)",
                             lambda: robot.look_at_valve("drain", "cellar"),
                             robot.cancel,
                             keep=False,
                         ),
                     ),
-                ),
-                sequence(
-                    "sequence",
-                    Condition("not jammed(drain)", lambda: negated(robot.jammed("drain"))),
-                    Try(
-                        "turn_valve(drain,cellar)",
-                        lambda: robot.turn_valve("drain", "cellar"),
+                    sequence(
+                        "sequence",
+                        Condition("not torch_on()", lambda: negated(robot.torch_on())),
+                        Latch(
+                            "switch_lamps_on(cellar)",
+                            lambda: robot.switch_lamps_on("cellar"),
+                            robot.cancel,
+                            keep=False,
+                        ),
+                    ),
+                    Latch(
+                        "look_at_valve(drain,cellar)",
+                        lambda: robot.look_at_valve("drain", "cellar"),
                         robot.cancel,
                         keep=False,
                     ),
                 ),
             ),
+            sequence(
+                "sequence",
+                Condition("jammed(drain)", lambda: robot.jammed("drain")),
+                Latch(
+                    "shake_loose(drain)",
+                    lambda: robot.shake_loose("drain"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("at(cellar)", lambda: robot.at("cellar")),
+                Latch(
+                    "turn_valve(drain,cellar)",
+                    lambda: robot.turn_valve("drain", "cellar"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            Latch("drive(cellar)", lambda: robot.drive("cellar"), robot.cancel, keep=False),
         ),
         READS,
     )
@@ -574,6 +546,12 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("1/4", {}),
         ],
     ],
+    ("shake_loose", "drain"): [
+        [
+            Outcome("1/2", {}, When(lambda s: s[("at", "cellar")], {("jammed", "drain"): False})),
+            Outcome("1/2", {}),
+        ],
+    ],
     ("switch_lamps_on", "cellar"): [
         [Outcome("4/5", {("lit", "cellar"): True}), Outcome("1/5", {})],
     ],
@@ -611,6 +589,9 @@ class SimulatedWorld(World):
 
     def look_at_valve(self, valve: str, area: str) -> Status:
         return self._act("look_at_valve", valve, area)
+
+    def shake_loose(self, valve: str) -> Status:
+        return self._act("shake_loose", valve)
 
     def switch_lamps_on(self, area: str) -> Status:
         return self._act("switch_lamps_on", area)

@@ -1,6 +1,7 @@
 """Behavior tree for the problem survey of the domain inspection. Made by bbtc.
 
-In the model of that domain it succeeds with probability 38799/40000.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -65,6 +66,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def any_of(*values: bool | None) -> bool | None:
@@ -177,40 +185,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -219,11 +193,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -336,57 +305,77 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            7,
+        fallback(
+            "fallback",
             sequence(
                 "sequence",
-                fallback(
-                    "fallback",
-                    Condition("known closed(inlet)", lambda: robot.closed("inlet") is not None),
-                    Try(
-                        "look_at_valve(inlet,pump_hall)",
-                        lambda: robot.look_at_valve("inlet", "pump_hall"),
-                        robot.cancel,
-                        keep=False,
+                Condition("known closed(inlet)", lambda: robot.closed("inlet") is not None),
+                Condition("known closed(drain)", lambda: robot.closed("drain") is not None),
+            ),
+            sequence(
+                "sequence",
+                Condition("unknown closed(inlet)", lambda: robot.closed("inlet") is None),
+                Condition("at(pump_hall)", lambda: robot.at("pump_hall")),
+                Latch(
+                    "look_at_valve(inlet,pump_hall)",
+                    lambda: robot.look_at_valve("inlet", "pump_hall"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.closed("inlet") is None,
+                        robot.at("pump_hall"),
+                        any_of(robot.lit("pump_hall"), robot.torch_on()),
                     ),
+                    keep=False,
                 ),
-                fallback(
-                    "fallback",
-                    Condition("known closed(drain)", lambda: robot.closed("drain") is not None),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            Condition("at(cellar)", lambda: robot.at("cellar")),
-                            Try(
-                                "drive(cellar)",
-                                lambda: robot.drive("cellar"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        fallback(
-                            "fallback",
-                            Condition(
-                                "(lit(cellar) or torch_on())",
-                                lambda: any_of(robot.lit("cellar"), robot.torch_on()),
-                            ),
-                            Try(
-                                "switch_lamps_on(cellar)",
-                                lambda: robot.switch_lamps_on("cellar"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        Try(
-                            "look_at_valve(drain,cellar)",
-                            lambda: robot.look_at_valve("drain", "cellar"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not at(cellar)", lambda: negated(robot.at("cellar"))),
+                Latch("drive(cellar)", lambda: robot.drive("cellar"), robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition("lit(cellar)", lambda: robot.lit("cellar")),
+                Condition("unknown closed(drain)", lambda: robot.closed("drain") is None),
+                Latch(
+                    "look_at_valve(drain,cellar)",
+                    lambda: robot.look_at_valve("drain", "cellar"),
+                    robot.cancel,
+                    keep=False,
                 ),
+            ),
+            sequence(
+                "sequence",
+                Condition("unknown closed(drain)", lambda: robot.closed("drain") is None),
+                Condition("not torch_on()", lambda: negated(robot.torch_on())),
+                Latch(
+                    "switch_lamps_on(cellar)",
+                    lambda: robot.switch_lamps_on("cellar"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("known closed(drain)", lambda: robot.closed("drain") is not None),
+                Latch(
+                    "drive(pump_hall)",
+                    lambda: robot.drive("pump_hall"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.at("pump_hall")),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "look_at_valve(drain,cellar)",
+                lambda: robot.look_at_valve("drain", "cellar"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.closed("drain") is None,
+                    robot.at("cellar"),
+                    any_of(robot.lit("cellar"), robot.torch_on()),
+                ),
+                keep=False,
             ),
         ),
         READS,
@@ -497,9 +486,11 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 READS: dict[Fact, bool] = {
     ("at", "cellar"): False,
+    ("at", "pump_hall"): False,
     ("closed", "drain"): True,
     ("closed", "inlet"): True,
     ("lit", "cellar"): False,
+    ("lit", "pump_hall"): False,
     ("torch_on",): False,
 }
 """The facts that the tree reads, and whether they can be unknown."""
@@ -515,6 +506,7 @@ INITIAL: list[tuple[str, State]] = [
             ("closed", "inlet"): None,
             ("lens_clean",): False,
             ("lit", "cellar"): False,
+            ("lit", "pump_hall"): True,
             ("torch_on",): False,
         },
     ),
@@ -524,6 +516,7 @@ INITIAL: list[tuple[str, State]] = [
 
 ACTIONS: dict[Fact, list[Factor]] = {
     ("drive", "cellar"): [[Outcome("1", {("at", "cellar"): True, ("at", "pump_hall"): False})]],
+    ("drive", "pump_hall"): [[Outcome("1", {("at", "cellar"): False, ("at", "pump_hall"): True})]],
     ("look_at_valve", "drain", "cellar"): [
         [
             Outcome("2/3", {}, When(lambda s: s[("lens_clean",)], {("closed", "drain"): True})),

@@ -1,6 +1,7 @@
 """Behavior tree for the problem gift-set of the domain kitting. Made by bbtc.
 
-In the model of that domain it succeeds with probability 53246760311/61440000000.
+In the model of that domain it succeeds with probability 731025/790321.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -21,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector, Sequence
+from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -36,6 +37,9 @@ class Robot(Protocol):
 
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
+
+    def gripper_free(self) -> bool | None:
+        """Whether gripper_free() holds."""
 
     def holding(self, item: str) -> bool | None:
         """Whether holding(item) holds; None where that is unknown."""
@@ -68,6 +72,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -173,60 +184,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
-class Skipper(Composite):
-    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
-
-    def tick(self) -> Iterator[Behaviour]:
-        status = Status.RUNNING
-        for child in self.children:
-            yield from child.tick()
-            self.current_child = child
-            status = child.status
-            if status != Status.RUNNING:
-                break
-        if status != Status.RUNNING:
-            for child in self.children:
-                if child is not self.current_child and child.status != Status.INVALID:
-                    child.stop(Status.INVALID)
-            self.stop(status)
-        self.status = status
-        yield self
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -235,16 +192,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def skipper(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children are running. Every tick starts at the first child."""
-    return Skipper(name, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -357,123 +304,126 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            12,
+        fallback(
+            "fallback",
             sequence(
                 "sequence",
-                fallback(
-                    "fallback",
-                    Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            skipper(
-                                "skipper",
-                                Condition("holding(wine)", lambda: robot.holding("wine")),
-                                Try(
-                                    "read_force_sensor(wine)",
-                                    lambda: robot.read_force_sensor("wine"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                            sequence(
-                                "sequence",
-                                fallback(
-                                    "fallback",
-                                    Condition("in_view(wine)", lambda: robot.in_view("wine")),
-                                    sequence(
-                                        "sequence",
-                                        Condition(
-                                            "not lost(wine)",
-                                            lambda: negated(robot.lost("wine")),
-                                        ),
-                                        Try(
-                                            "look_for(wine)",
-                                            lambda: robot.look_for("wine"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                ),
-                                Try(
-                                    "pick(wine)",
-                                    lambda: robot.pick("wine"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                        ),
-                        Try(
-                            "place(wine,crate1)",
-                            lambda: robot.place("wine", "crate1"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
+                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                Condition(
+                    "packed(chocolates,crate1)",
+                    lambda: robot.packed("chocolates", "crate1"),
                 ),
-                fallback(
-                    "fallback",
-                    Condition(
-                        "packed(chocolates,crate1)",
-                        lambda: robot.packed("chocolates", "crate1"),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "known holding(chocolates)",
+                    lambda: robot.holding("chocolates") is not None,
+                ),
+                Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
+                Latch(
+                    "place(chocolates,crate1)",
+                    lambda: robot.place("chocolates", "crate1"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("known holding(wine)", lambda: robot.holding("wine") is not None),
+                Condition("holding(wine)", lambda: robot.holding("wine")),
+                Latch(
+                    "place(wine,crate1)",
+                    lambda: robot.place("wine", "crate1"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "unknown holding(chocolates)",
+                    lambda: robot.holding("chocolates") is None,
+                ),
+                Latch(
+                    "read_force_sensor(chocolates)",
+                    lambda: robot.read_force_sensor("chocolates"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("unknown holding(wine)", lambda: robot.holding("wine") is None),
+                Latch(
+                    "read_force_sensor(wine)",
+                    lambda: robot.read_force_sensor("wine"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("in_view(chocolates)", lambda: robot.in_view("chocolates")),
+                Condition(
+                    "not packed(chocolates,crate1)",
+                    lambda: negated(robot.packed("chocolates", "crate1")),
+                ),
+                Condition("not lost(wine)", lambda: negated(robot.lost("wine"))),
+                Latch(
+                    "pick(chocolates)",
+                    lambda: robot.pick("chocolates"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.gripper_free(),
+                        robot.in_view("chocolates"),
+                        negated(robot.holding("chocolates")),
+                        negated(robot.lost("chocolates")),
                     ),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            skipper(
-                                "skipper",
-                                Condition(
-                                    "holding(chocolates)",
-                                    lambda: robot.holding("chocolates"),
-                                ),
-                                Try(
-                                    "read_force_sensor(chocolates)",
-                                    lambda: robot.read_force_sensor("chocolates"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                            sequence(
-                                "sequence",
-                                fallback(
-                                    "fallback",
-                                    Condition(
-                                        "in_view(chocolates)",
-                                        lambda: robot.in_view("chocolates"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        Condition(
-                                            "not lost(chocolates)",
-                                            lambda: negated(robot.lost("chocolates")),
-                                        ),
-                                        Try(
-                                            "look_for(chocolates)",
-                                            lambda: robot.look_for("chocolates"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                ),
-                                Try(
-                                    "pick(chocolates)",
-                                    lambda: robot.pick("chocolates"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                        ),
-                        Try(
-                            "place(chocolates,crate1)",
-                            lambda: robot.place("chocolates", "crate1"),
-                            robot.cancel,
-                            keep=False,
-                        ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not in_view(wine)", lambda: negated(robot.in_view("wine"))),
+                Condition("not lost(wine)", lambda: negated(robot.lost("wine"))),
+                Condition("not lost(chocolates)", lambda: negated(robot.lost("chocolates"))),
+                Latch("look_for(wine)", lambda: robot.look_for("wine"), robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition("in_view(wine)", lambda: robot.in_view("wine")),
+                Condition("not lost(chocolates)", lambda: negated(robot.lost("chocolates"))),
+                Condition(
+                    "not packed(wine,crate1)",
+                    lambda: negated(robot.packed("wine", "crate1")),
+                ),
+                Latch(
+                    "pick(wine)",
+                    lambda: robot.pick("wine"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.gripper_free(),
+                        robot.in_view("wine"),
+                        negated(robot.holding("wine")),
+                        negated(robot.lost("wine")),
                     ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                Condition("not lost(chocolates)", lambda: negated(robot.lost("chocolates"))),
+                Latch(
+                    "look_for(chocolates)",
+                    lambda: robot.look_for("chocolates"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.in_view("chocolates")),
+                        negated(robot.lost("chocolates")),
+                    ),
+                    keep=False,
                 ),
             ),
         ),
@@ -584,6 +534,7 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 
 READS: dict[Fact, bool] = {
+    ("gripper_free",): False,
     ("holding", "chocolates"): True,
     ("holding", "wine"): True,
     ("in_view", "chocolates"): False,
@@ -726,6 +677,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
 
 class SimulatedWorld(World):
     """Plays the robot."""
+
+    def gripper_free(self) -> bool | None:
+        return self._value("gripper_free")
 
     def holding(self, item: str) -> bool | None:
         return self._value("holding", item)

@@ -1,6 +1,7 @@
 """Behavior tree for the problem one-bottle of the domain kitting. Made by bbtc.
 
-In the model of that domain it succeeds with probability 115834773/128000000.
+In the model of that domain it succeeds with probability 855/889.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -21,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector, Sequence
+from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -36,6 +37,9 @@ class Robot(Protocol):
 
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
+
+    def gripper_free(self) -> bool | None:
+        """Whether gripper_free() holds."""
 
     def holding(self, item: str) -> bool | None:
         """Whether holding(item) holds; None where that is unknown."""
@@ -68,6 +72,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -173,60 +184,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
-class Skipper(Composite):
-    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
-
-    def tick(self) -> Iterator[Behaviour]:
-        status = Status.RUNNING
-        for child in self.children:
-            yield from child.tick()
-            self.current_child = child
-            status = child.status
-            if status != Status.RUNNING:
-                break
-        if status != Status.RUNNING:
-            for child in self.children:
-                if child is not self.current_child and child.status != Status.INVALID:
-                    child.stop(Status.INVALID)
-            self.stop(status)
-        self.status = status
-        yield self
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -235,16 +192,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def skipper(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children are running. Every tick starts at the first child."""
-    return Skipper(name, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -360,56 +307,55 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("packed(water,tray1)", lambda: robot.packed("water", "tray1")),
-            retry(
-                "retry",
-                8,
-                sequence(
-                    "sequence",
-                    fallback(
-                        "fallback",
-                        skipper(
-                            "skipper",
-                            Condition("holding(water)", lambda: robot.holding("water")),
-                            Try(
-                                "read_force_sensor(water)",
-                                lambda: robot.read_force_sensor("water"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        sequence(
-                            "sequence",
-                            fallback(
-                                "fallback",
-                                Condition("in_view(water)", lambda: robot.in_view("water")),
-                                sequence(
-                                    "sequence",
-                                    Condition(
-                                        "not lost(water)",
-                                        lambda: negated(robot.lost("water")),
-                                    ),
-                                    Try(
-                                        "look_for(water)",
-                                        lambda: robot.look_for("water"),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                            ),
-                            Try(
-                                "pick(water)",
-                                lambda: robot.pick("water"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
+            sequence(
+                "sequence",
+                Condition("known holding(water)", lambda: robot.holding("water") is not None),
+                Condition("holding(water)", lambda: robot.holding("water")),
+                Latch(
+                    "place(water,tray1)",
+                    lambda: robot.place("water", "tray1"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("unknown holding(water)", lambda: robot.holding("water") is None),
+                Latch(
+                    "read_force_sensor(water)",
+                    lambda: robot.read_force_sensor("water"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("in_view(water)", lambda: robot.in_view("water")),
+                Latch(
+                    "pick(water)",
+                    lambda: robot.pick("water"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.gripper_free(),
+                        robot.in_view("water"),
+                        negated(robot.holding("water")),
+                        negated(robot.lost("water")),
                     ),
-                    Try(
-                        "place(water,tray1)",
-                        lambda: robot.place("water", "tray1"),
-                        robot.cancel,
-                        keep=False,
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not lost(water)", lambda: negated(robot.lost("water"))),
+                Latch(
+                    "look_for(water)",
+                    lambda: robot.look_for("water"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.in_view("water")),
+                        negated(robot.lost("water")),
                     ),
+                    keep=False,
                 ),
             ),
         ),
@@ -520,6 +466,7 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 
 READS: dict[Fact, bool] = {
+    ("gripper_free",): False,
     ("holding", "water"): True,
     ("in_view", "water"): False,
     ("lost", "water"): False,
@@ -596,6 +543,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
 
 class SimulatedWorld(World):
     """Plays the robot."""
+
+    def gripper_free(self) -> bool | None:
+        return self._value("gripper_free")
 
     def holding(self, item: str) -> bool | None:
         return self._value("holding", item)

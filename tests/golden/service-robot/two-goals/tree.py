@@ -1,6 +1,7 @@
 """Behavior tree for the problem two-goals of the domain service-robot. Made by bbtc.
 
-In the model of that domain it succeeds with probability 95863550171240514325017033/100000000000000000000000000.
+In the model of that domain it succeeds with probability 63/64.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -39,6 +40,9 @@ class Robot(Protocol):
 
     def at(self, item: str, spot: str) -> bool | None:
         """Whether at(item, spot) holds; None where that is unknown."""
+
+    def hand_free(self) -> bool | None:
+        """Whether hand_free() holds."""
 
     def holding(self, item: str) -> bool | None:
         """Whether holding(item) holds."""
@@ -171,40 +175,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 class Skipper(Composite):
     """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
 
@@ -238,11 +208,6 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -355,239 +320,244 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            17,
-            sequence(
-                "sequence",
-                fallback(
-                    "fallback",
-                    Condition("at(cup1,cupboard4)", lambda: robot.at("cup1", "cupboard4")),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            Condition("open(cupboard4)", lambda: robot.is_open("cupboard4")),
-                            sequence(
-                                "sequence",
-                                fallback(
-                                    "fallback",
-                                    Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
-                                    Try(
-                                        "walk(cupboard4)",
-                                        lambda: robot.walk("cupboard4"),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                                Try(
-                                    "open(cupboard4)",
-                                    lambda: robot.open("cupboard4"),
+        sequence(
+            "sequence",
+            fallback(
+                "fallback",
+                Condition("at(cup1,cupboard4)", lambda: robot.at("cup1", "cupboard4")),
+                sequence(
+                    "sequence",
+                    fallback(
+                        "fallback",
+                        Condition("open(cupboard4)", lambda: robot.is_open("cupboard4")),
+                        sequence(
+                            "sequence",
+                            fallback(
+                                "fallback",
+                                Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
+                                Latch(
+                                    "walk(cupboard4)",
+                                    lambda: robot.walk("cupboard4"),
                                     robot.cancel,
                                     keep=False,
                                 ),
                             ),
-                        ),
-                        fallback(
-                            "fallback",
-                            Condition("holding(cup1)", lambda: robot.holding("cup1")),
-                            sequence(
-                                "sequence",
-                                fallback(
-                                    "fallback",
-                                    Condition("near(table1)", lambda: robot.near("table1")),
-                                    Try(
-                                        "walk(table1)",
-                                        lambda: robot.walk("table1"),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                                Try(
-                                    "pick(cup1,table1)",
-                                    lambda: robot.pick("cup1", "table1"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                        ),
-                        fallback(
-                            "fallback",
-                            Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
-                            Try(
-                                "walk(cupboard4)",
-                                lambda: robot.walk("cupboard4"),
+                            Condition("hand_free()", robot.hand_free),
+                            Latch(
+                                "open(cupboard4)",
+                                lambda: robot.open("cupboard4"),
                                 robot.cancel,
                                 keep=False,
                             ),
                         ),
-                        Try(
-                            "place(cup1,cupboard4)",
-                            lambda: robot.place("cup1", "cupboard4"),
+                    ),
+                    fallback(
+                        "fallback",
+                        Condition("holding(cup1)", lambda: robot.holding("cup1")),
+                        sequence(
+                            "sequence",
+                            Condition("at(cup1,table1)", lambda: robot.at("cup1", "table1")),
+                            fallback(
+                                "fallback",
+                                Condition("near(table1)", lambda: robot.near("table1")),
+                                Latch(
+                                    "walk(table1)",
+                                    lambda: robot.walk("table1"),
+                                    robot.cancel,
+                                    keep=False,
+                                ),
+                            ),
+                            Condition("hand_free()", robot.hand_free),
+                            Latch(
+                                "pick(cup1,table1)",
+                                lambda: robot.pick("cup1", "table1"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                    ),
+                    fallback(
+                        "fallback",
+                        Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
+                        Latch(
+                            "walk(cupboard4)",
+                            lambda: robot.walk("cupboard4"),
                             robot.cancel,
                             keep=False,
                         ),
                     ),
+                    Latch(
+                        "place(cup1,cupboard4)",
+                        lambda: robot.place("cup1", "cupboard4"),
+                        robot.cancel,
+                        keep=False,
+                    ),
                 ),
-                fallback(
-                    "fallback",
-                    Condition("at(book3,drawer6)", lambda: robot.at("book3", "drawer6")),
-                    sequence(
-                        "sequence",
-                        fallback(
-                            "fallback",
-                            Condition("open(drawer6)", lambda: robot.is_open("drawer6")),
-                            sequence(
-                                "sequence",
-                                fallback(
-                                    "fallback",
-                                    Condition("near(drawer6)", lambda: robot.near("drawer6")),
-                                    Try(
-                                        "walk(drawer6)",
-                                        lambda: robot.walk("drawer6"),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                                Try(
-                                    "open(drawer6)",
-                                    lambda: robot.open("drawer6"),
+            ),
+            fallback(
+                "fallback",
+                Condition("at(book3,drawer6)", lambda: robot.at("book3", "drawer6")),
+                sequence(
+                    "sequence",
+                    fallback(
+                        "fallback",
+                        Condition("open(drawer6)", lambda: robot.is_open("drawer6")),
+                        sequence(
+                            "sequence",
+                            fallback(
+                                "fallback",
+                                Condition("near(drawer6)", lambda: robot.near("drawer6")),
+                                Latch(
+                                    "walk(drawer6)",
+                                    lambda: robot.walk("drawer6"),
                                     robot.cancel,
                                     keep=False,
                                 ),
                             ),
-                        ),
-                        fallback(
-                            "fallback",
-                            Condition("holding(book3)", lambda: robot.holding("book3")),
-                            sequence(
-                                "sequence",
-                                skipper(
-                                    "skipper",
-                                    Condition(
-                                        "at(book3,counter5)",
-                                        lambda: robot.at("book3", "counter5"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        fallback(
-                                            "fallback",
-                                            Condition(
-                                                "near(counter5)",
-                                                lambda: robot.near("counter5"),
-                                            ),
-                                            Try(
-                                                "walk(counter5)",
-                                                lambda: robot.walk("counter5"),
-                                                robot.cancel,
-                                                keep=False,
-                                            ),
-                                        ),
-                                        Try(
-                                            "look_for(book3,counter5)",
-                                            lambda: robot.look_for("book3", "counter5"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                ),
-                                Try(
-                                    "pick(book3,counter5)",
-                                    lambda: robot.pick("book3", "counter5"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                            sequence(
-                                "sequence",
-                                skipper(
-                                    "skipper",
-                                    Condition(
-                                        "at(book3,cupboard4)",
-                                        lambda: robot.at("book3", "cupboard4"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        fallback(
-                                            "fallback",
-                                            Condition(
-                                                "near(cupboard4)",
-                                                lambda: robot.near("cupboard4"),
-                                            ),
-                                            Try(
-                                                "walk(cupboard4)",
-                                                lambda: robot.walk("cupboard4"),
-                                                robot.cancel,
-                                                keep=False,
-                                            ),
-                                        ),
-                                        Try(
-                                            "look_for(book3,cupboard4)",
-                                            lambda: robot.look_for("book3", "cupboard4"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                ),
-                                Try(
-                                    "pick(book3,cupboard4)",
-                                    lambda: robot.pick("book3", "cupboard4"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                            sequence(
-                                "sequence",
-                                skipper(
-                                    "skipper",
-                                    Condition(
-                                        "at(book3,shelf3)",
-                                        lambda: robot.at("book3", "shelf3"),
-                                    ),
-                                    sequence(
-                                        "sequence",
-                                        fallback(
-                                            "fallback",
-                                            Condition("near(shelf3)", lambda: robot.near("shelf3")),
-                                            Try(
-                                                "walk(shelf3)",
-                                                lambda: robot.walk("shelf3"),
-                                                robot.cancel,
-                                                keep=False,
-                                            ),
-                                        ),
-                                        Try(
-                                            "look_for(book3,shelf3)",
-                                            lambda: robot.look_for("book3", "shelf3"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                ),
-                                Try(
-                                    "pick(book3,shelf3)",
-                                    lambda: robot.pick("book3", "shelf3"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                        ),
-                        fallback(
-                            "fallback",
-                            Condition("near(drawer6)", lambda: robot.near("drawer6")),
-                            Try(
-                                "walk(drawer6)",
-                                lambda: robot.walk("drawer6"),
+                            Condition("hand_free()", robot.hand_free),
+                            Latch(
+                                "open(drawer6)",
+                                lambda: robot.open("drawer6"),
                                 robot.cancel,
                                 keep=False,
                             ),
                         ),
-                        Try(
-                            "place(book3,drawer6)",
-                            lambda: robot.place("book3", "drawer6"),
+                    ),
+                    fallback(
+                        "fallback",
+                        Condition("holding(book3)", lambda: robot.holding("book3")),
+                        sequence(
+                            "sequence",
+                            skipper(
+                                "skipper",
+                                Condition(
+                                    "at(book3,counter5)",
+                                    lambda: robot.at("book3", "counter5"),
+                                ),
+                                sequence(
+                                    "sequence",
+                                    fallback(
+                                        "fallback",
+                                        Condition("near(counter5)", lambda: robot.near("counter5")),
+                                        Latch(
+                                            "walk(counter5)",
+                                            lambda: robot.walk("counter5"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                    Latch(
+                                        "look_for(book3,counter5)",
+                                        lambda: robot.look_for("book3", "counter5"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                            ),
+                            Condition("near(counter5)", lambda: robot.near("counter5")),
+                            Condition("hand_free()", robot.hand_free),
+                            Latch(
+                                "pick(book3,counter5)",
+                                lambda: robot.pick("book3", "counter5"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                        sequence(
+                            "sequence",
+                            skipper(
+                                "skipper",
+                                Condition(
+                                    "at(book3,cupboard4)",
+                                    lambda: robot.at("book3", "cupboard4"),
+                                ),
+                                sequence(
+                                    "sequence",
+                                    fallback(
+                                        "fallback",
+                                        Condition(
+                                            "near(cupboard4)",
+                                            lambda: robot.near("cupboard4"),
+                                        ),
+                                        Latch(
+                                            "walk(cupboard4)",
+                                            lambda: robot.walk("cupboard4"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                    Condition(
+                                        "open(cupboard4)",
+                                        lambda: robot.is_open("cupboard4"),
+                                    ),
+                                    Latch(
+                                        "look_for(book3,cupboard4)",
+                                        lambda: robot.look_for("book3", "cupboard4"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                            ),
+                            Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
+                            Condition("hand_free()", robot.hand_free),
+                            Condition("open(cupboard4)", lambda: robot.is_open("cupboard4")),
+                            Latch(
+                                "pick(book3,cupboard4)",
+                                lambda: robot.pick("book3", "cupboard4"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                        sequence(
+                            "sequence",
+                            skipper(
+                                "skipper",
+                                Condition("at(book3,shelf3)", lambda: robot.at("book3", "shelf3")),
+                                sequence(
+                                    "sequence",
+                                    fallback(
+                                        "fallback",
+                                        Condition("near(shelf3)", lambda: robot.near("shelf3")),
+                                        Latch(
+                                            "walk(shelf3)",
+                                            lambda: robot.walk("shelf3"),
+                                            robot.cancel,
+                                            keep=False,
+                                        ),
+                                    ),
+                                    Latch(
+                                        "look_for(book3,shelf3)",
+                                        lambda: robot.look_for("book3", "shelf3"),
+                                        robot.cancel,
+                                        keep=False,
+                                    ),
+                                ),
+                            ),
+                            Condition("near(shelf3)", lambda: robot.near("shelf3")),
+                            Condition("hand_free()", robot.hand_free),
+                            Latch(
+                                "pick(book3,shelf3)",
+                                lambda: robot.pick("book3", "shelf3"),
+                                robot.cancel,
+                                keep=False,
+                            ),
+                        ),
+                    ),
+                    fallback(
+                        "fallback",
+                        Condition("near(drawer6)", lambda: robot.near("drawer6")),
+                        Latch(
+                            "walk(drawer6)",
+                            lambda: robot.walk("drawer6"),
                             robot.cancel,
                             keep=False,
                         ),
+                    ),
+                    Latch(
+                        "place(book3,drawer6)",
+                        lambda: robot.place("book3", "drawer6"),
+                        robot.cancel,
+                        keep=False,
                     ),
                 ),
             ),
@@ -704,6 +674,8 @@ READS: dict[Fact, bool] = {
     ("at", "book3", "drawer6"): True,
     ("at", "book3", "shelf3"): True,
     ("at", "cup1", "cupboard4"): True,
+    ("at", "cup1", "table1"): True,
+    ("hand_free",): False,
     ("holding", "book3"): False,
     ("holding", "cup1"): False,
     ("near", "counter5"): False,
@@ -928,6 +900,9 @@ class SimulatedWorld(World):
 
     def at(self, item: str, spot: str) -> bool | None:
         return self._value("at", item, spot)
+
+    def hand_free(self) -> bool | None:
+        return self._value("hand_free")
 
     def holding(self, item: str) -> bool | None:
         return self._value("holding", item)

@@ -1,6 +1,7 @@
 """Behavior tree for the problem three-trays of the domain trolley. Made by bbtc.
 
-In the model of that domain it succeeds with probability 12393/12500.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -37,6 +38,12 @@ class Robot(Protocol):
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
+    def on(self, tray: str) -> bool | None:
+        """Whether on(tray) holds."""
+
+    def spilled(self, tray: str) -> bool | None:
+        """Whether spilled(tray) holds."""
+
     def strapped(self, tray: str) -> bool | None:
         """Whether strapped(tray) holds."""
 
@@ -45,6 +52,9 @@ class Robot(Protocol):
 
     def push(self, to: str) -> Status:
         """Start or continue push(to)."""
+
+    def put_back(self, tray: str) -> Status:
+        """Start or continue put_back(tray)."""
 
     def strap(self, tray: str) -> Status:
         """Start or continue strap(tray)."""
@@ -168,40 +178,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -210,11 +186,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -327,28 +298,94 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            6,
-            fallback(
-                "fallback",
-                Condition("trolley_at(ward)", lambda: robot.trolley_at("ward")),
-                sequence(
-                    "sequence",
-                    Condition("not strapped(tray1)", lambda: negated(robot.strapped("tray1"))),
-                    Try("strap(tray1)", lambda: robot.strap("tray1"), robot.cancel, keep=False),
+        fallback(
+            "fallback",
+            Condition(
+                "(trolley_at(ward) and on(tray1) and on(tray2) and on(tray3))",
+                lambda: all_of(
+                    robot.trolley_at("ward"),
+                    robot.on("tray1"),
+                    robot.on("tray2"),
+                    robot.on("tray3"),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("not strapped(tray2)", lambda: negated(robot.strapped("tray2"))),
-                    Try("strap(tray2)", lambda: robot.strap("tray2"), robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(strapped(tray1) and strapped(tray2) and strapped(tray3))",
+                    lambda: all_of(
+                        robot.strapped("tray1"),
+                        robot.strapped("tray2"),
+                        robot.strapped("tray3"),
+                    ),
                 ),
-                sequence(
-                    "sequence",
-                    Condition("strapped(tray3)", lambda: robot.strapped("tray3")),
-                    Try("push(ward)", lambda: robot.push("ward"), robot.cancel, keep=False),
+                Latch(
+                    "push(ward)",
+                    lambda: robot.push("ward"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.trolley_at("ward")),
+                    keep=False,
                 ),
-                Try("strap(tray3)", lambda: robot.strap("tray3"), robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(strapped(tray1) and strapped(tray2))",
+                    lambda: all_of(robot.strapped("tray1"), robot.strapped("tray2")),
+                ),
+                Latch(
+                    "strap(tray3)",
+                    lambda: robot.strap("tray3"),
+                    robot.cancel,
+                    guard=lambda: robot.on("tray3"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("strapped(tray1)", lambda: robot.strapped("tray1")),
+                Latch(
+                    "strap(tray2)",
+                    lambda: robot.strap("tray2"),
+                    robot.cancel,
+                    guard=lambda: robot.on("tray2"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(on(tray2) and on(tray3))",
+                    lambda: all_of(robot.on("tray2"), robot.on("tray3")),
+                ),
+                Latch(
+                    "strap(tray1)",
+                    lambda: robot.strap("tray1"),
+                    robot.cancel,
+                    guard=lambda: robot.on("tray1"),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "put_back(tray1)",
+                lambda: robot.put_back("tray1"),
+                robot.cancel,
+                guard=lambda: all_of(negated(robot.on("tray1")), negated(robot.spilled("tray1"))),
+                keep=False,
+            ),
+            Latch(
+                "put_back(tray2)",
+                lambda: robot.put_back("tray2"),
+                robot.cancel,
+                guard=lambda: all_of(negated(robot.on("tray2")), negated(robot.spilled("tray2"))),
+                keep=False,
+            ),
+            Latch(
+                "put_back(tray3)",
+                lambda: robot.put_back("tray3"),
+                robot.cancel,
+                guard=lambda: all_of(negated(robot.on("tray3")), negated(robot.spilled("tray3"))),
+                keep=False,
             ),
         ),
         READS,
@@ -458,6 +495,12 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 
 READS: dict[Fact, bool] = {
+    ("on", "tray1"): False,
+    ("on", "tray2"): False,
+    ("on", "tray3"): False,
+    ("spilled", "tray1"): False,
+    ("spilled", "tray2"): False,
+    ("spilled", "tray3"): False,
     ("strapped", "tray1"): False,
     ("strapped", "tray2"): False,
     ("strapped", "tray3"): False,
@@ -548,6 +591,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("9/10", {}),
         ],
     ],
+    ("put_back", "tray1"): [[Outcome("4/5", {("on", "tray1"): True}), Outcome("1/5", {})]],
+    ("put_back", "tray2"): [[Outcome("4/5", {("on", "tray2"): True}), Outcome("1/5", {})]],
+    ("put_back", "tray3"): [[Outcome("4/5", {("on", "tray3"): True}), Outcome("1/5", {})]],
     ("strap", "tray1"): [[Outcome("9/10", {("strapped", "tray1"): True}), Outcome("1/10", {})]],
     ("strap", "tray2"): [[Outcome("9/10", {("strapped", "tray2"): True}), Outcome("1/10", {})]],
     ("strap", "tray3"): [[Outcome("9/10", {("strapped", "tray3"): True}), Outcome("1/10", {})]],
@@ -558,6 +604,12 @@ ACTIONS: dict[Fact, list[Factor]] = {
 class SimulatedWorld(World):
     """Plays the robot."""
 
+    def on(self, tray: str) -> bool | None:
+        return self._value("on", tray)
+
+    def spilled(self, tray: str) -> bool | None:
+        return self._value("spilled", tray)
+
     def strapped(self, tray: str) -> bool | None:
         return self._value("strapped", tray)
 
@@ -566,6 +618,9 @@ class SimulatedWorld(World):
 
     def push(self, to: str) -> Status:
         return self._act("push", to)
+
+    def put_back(self, tray: str) -> Status:
+        return self._act("put_back", tray)
 
     def strap(self, tray: str) -> Status:
         return self._act("strap", tray)

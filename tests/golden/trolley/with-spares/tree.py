@@ -1,6 +1,7 @@
 """Behavior tree for the problem with-spares of the domain trolley. Made by bbtc.
 
-In the model of that domain it succeeds with probability 124/125.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -21,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -174,53 +175,9 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
-def sequence(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children succeed. Every tick starts at the first child."""
-    return Sequence(name, memory=False, children=list(children))
-
-
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -333,31 +290,32 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            3,
-            fallback(
-                "fallback",
-                sequence(
-                    "sequence",
-                    Condition("on(tray2)", lambda: robot.on("tray2")),
-                    fallback(
-                        "fallback",
-                        Condition("trolley_at(ward)", lambda: robot.trolley_at("ward")),
-                        Try("push(ward)", lambda: robot.push("ward"), robot.cancel, keep=False),
-                    ),
-                ),
-                sequence(
-                    "sequence",
-                    Condition("not spilled(tray2)", lambda: negated(robot.spilled("tray2"))),
-                    Try(
-                        "put_back(tray2)",
-                        lambda: robot.put_back("tray2"),
-                        robot.cancel,
-                        keep=False,
-                    ),
-                ),
-                Try("refill(tray2)", lambda: robot.refill("tray2"), robot.cancel, keep=False),
+        fallback(
+            "fallback",
+            Condition(
+                "(trolley_at(ward) and on(tray1) and on(tray2))",
+                lambda: all_of(robot.trolley_at("ward"), robot.on("tray1"), robot.on("tray2")),
+            ),
+            Latch(
+                "push(ward)",
+                lambda: robot.push("ward"),
+                robot.cancel,
+                guard=lambda: negated(robot.trolley_at("ward")),
+                keep=False,
+            ),
+            Latch(
+                "put_back(tray2)",
+                lambda: robot.put_back("tray2"),
+                robot.cancel,
+                guard=lambda: all_of(negated(robot.on("tray2")), negated(robot.spilled("tray2"))),
+                keep=False,
+            ),
+            Latch(
+                "refill(tray2)",
+                lambda: robot.refill("tray2"),
+                robot.cancel,
+                guard=lambda: robot.spilled("tray2"),
+                keep=False,
             ),
         ),
         READS,
@@ -467,6 +425,7 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 
 READS: dict[Fact, bool] = {
+    ("on", "tray1"): False,
     ("on", "tray2"): False,
     ("spilled", "tray2"): False,
     ("trolley_at", "ward"): False,
@@ -478,6 +437,7 @@ INITIAL: list[tuple[str, State]] = [
     (
         "1",
         {
+            ("on", "tray1"): True,
             ("on", "tray2"): True,
             ("spilled", "tray2"): False,
             ("strapped", "tray2"): False,

@@ -1,6 +1,7 @@
 """Behavior tree for the problem blocked-aisle of the domain warehouse. Made by bbtc.
 
-In the model of that domain it succeeds with probability 384183/400000.
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
 Implement the class Robot, and run
 
     run(create_root(MyRobot()), period=0.1)
@@ -49,6 +50,9 @@ class Robot(Protocol):
     def loaded(self, item: str) -> bool | None:
         """Whether loaded(item) holds."""
 
+    def stored(self, item: str, shelf: str) -> bool | None:
+        """Whether stored(item, shelf) holds; None where that is unknown."""
+
     def drive(self, to: str) -> Status:
         """Start or continue drive(to)."""
 
@@ -68,6 +72,20 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
 
 
 def negated(value: bool | None) -> bool | None:
@@ -173,40 +191,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Retry(Decorator):
-    """Returns what its child returns, and bounds how many actions may start below it: every start
-    is an attempt, and when all are used up, a further action fails instead of starting."""
-
-    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
-        super().__init__(name=name, child=child)
-        self.attempts = attempts
-        self.made = 0
-
-    def update(self) -> Status:
-        self.feedback_message = f"{self.made} of {self.attempts} attempts made"
-        return self.decorated.status
-
-
-class Try(Latch):
-    """An action below a Retry: it starts only if every Retry above it has an attempt left."""
-
-    def _ready(self) -> bool | None:
-        ready = super()._ready()
-        if not ready:
-            return ready
-        retries: list[Retry] = []
-        above = self.parent
-        while above is not None:
-            if isinstance(above, Retry):
-                retries.append(above)
-            above = above.parent
-        if any(retry.made >= retry.attempts for retry in retries):
-            return False
-        for retry in retries:
-            retry.made += 1
-        return True
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -215,11 +199,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:
-    """Lets at most so many actions start below."""
-    return Retry(name, attempts, child)
 
 
 @runtime_checkable
@@ -332,51 +311,97 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        retry(
-            "retry",
-            9,
-            fallback(
-                "fallback",
-                Condition("delivered(saw)", lambda: robot.delivered("saw")),
-                sequence(
-                    "sequence",
-                    Condition("blocked(packing,b1)", lambda: robot.blocked("packing", "b1")),
-                    Try(
-                        "move_pallet(packing,b1)",
-                        lambda: robot.move_pallet("packing", "b1"),
-                        robot.cancel,
-                        keep=False,
-                    ),
-                ),
-                sequence(
-                    "sequence",
-                    Condition("not loaded(saw)", lambda: negated(robot.loaded("saw"))),
-                    fallback(
-                        "fallback",
-                        sequence(
-                            "sequence",
-                            Condition("not at(b1)", lambda: negated(robot.at("b1"))),
-                            Try("drive(b1)", lambda: robot.drive("b1"), robot.cancel, keep=False),
-                        ),
-                        Try(
-                            "fetch(saw,b1)",
-                            lambda: robot.fetch("saw", "b1"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                ),
-                sequence(
-                    "sequence",
-                    Condition("at(b1)", lambda: robot.at("b1")),
-                    Try("drive(packing)", lambda: robot.drive("packing"), robot.cancel, keep=False),
-                ),
-                Try(
-                    "hand_in(saw,packing)",
-                    lambda: robot.hand_in("saw", "packing"),
+        fallback(
+            "fallback",
+            Condition("delivered(saw)", lambda: robot.delivered("saw")),
+            Latch(
+                "hand_in(saw,packing)",
+                lambda: robot.hand_in("saw", "packing"),
+                robot.cancel,
+                guard=lambda: all_of(robot.loaded("saw"), robot.at("packing")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("loaded(saw)", lambda: robot.loaded("saw")),
+                Latch(
+                    "drive(packing)",
+                    lambda: robot.drive("packing"),
                     robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.at("packing")),
+                        any_of(
+                            robot.at("packing"),
+                            all_of(
+                                any_of(
+                                    robot.at("b1"),
+                                    all_of(
+                                        robot.at("packing"),
+                                        negated(robot.blocked("packing", "b1")),
+                                        negated(robot.blocked("b1", "packing")),
+                                    ),
+                                ),
+                                negated(robot.blocked("b1", "packing")),
+                                negated(robot.blocked("packing", "b1")),
+                            ),
+                        ),
+                    ),
                     keep=False,
                 ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(at(b1) and known stored(saw,b1) and stored(saw,b1) and not…",
+                    lambda: all_of(
+                        robot.at("b1"),
+                        robot.stored("saw", "b1") is not None,
+                        robot.stored("saw", "b1"),
+                        negated(robot.loaded("saw")),
+                    ),
+                ),
+                Latch("fetch(saw,b1)", lambda: robot.fetch("saw", "b1"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "drive(b1)",
+                lambda: robot.drive("b1"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    negated(robot.at("b1")),
+                    any_of(
+                        robot.at("b1"),
+                        all_of(
+                            robot.at("packing"),
+                            negated(robot.blocked("packing", "b1")),
+                            negated(robot.blocked("b1", "packing")),
+                        ),
+                    ),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "move_pallet(packing,b1)",
+                lambda: robot.move_pallet("packing", "b1"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.blocked("packing", "b1"),
+                    any_of(
+                        robot.at("packing"),
+                        all_of(
+                            any_of(
+                                robot.at("b1"),
+                                all_of(
+                                    robot.at("packing"),
+                                    negated(robot.blocked("packing", "b1")),
+                                    negated(robot.blocked("b1", "packing")),
+                                ),
+                            ),
+                            negated(robot.blocked("b1", "packing")),
+                            negated(robot.blocked("packing", "b1")),
+                        ),
+                    ),
+                ),
+                keep=False,
             ),
         ),
         READS,
@@ -487,9 +512,12 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 
 READS: dict[Fact, bool] = {
     ("at", "b1"): False,
+    ("at", "packing"): False,
+    ("blocked", "b1", "packing"): False,
     ("blocked", "packing", "b1"): False,
     ("delivered", "saw"): False,
     ("loaded", "saw"): False,
+    ("stored", "saw", "b1"): True,
 }
 """The facts that the tree reads, and whether they can be unknown."""
 
@@ -500,6 +528,7 @@ INITIAL: list[tuple[str, State]] = [
         {
             ("at", "b1"): False,
             ("at", "packing"): True,
+            ("blocked", "b1", "packing"): False,
             ("blocked", "packing", "b1"): True,
             ("delivered", "saw"): False,
             ("loaded", "saw"): False,
@@ -546,6 +575,9 @@ class SimulatedWorld(World):
 
     def loaded(self, item: str) -> bool | None:
         return self._value("loaded", item)
+
+    def stored(self, item: str, shelf: str) -> bool | None:
+        return self._value("stored", item, shelf)
 
     def drive(self, to: str) -> Status:
         return self._act("drive", to)
