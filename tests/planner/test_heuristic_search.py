@@ -14,13 +14,14 @@ from bbtc.ground.condition import Is, conjunction
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits, Stage
-from bbtc.planner.mdp.bounded_search import SMALLEST_STEP, search_bounds
+from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.h_add import Facts, Relaxation, operators_of
 from bbtc.planner.mdp.maxprob import max_prob
 from bbtc.planner.mdp.solve import best_known
 from tests.long_form import amount
 from tests.planner.examples import Optimum, cases, public
+from tests.planner.journeys import journeys
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -30,12 +31,13 @@ MANY = examples(amount(100, 5000))
 """Random tasks of one kind."""
 
 
+SOME = st.one_of(journeys(), journeys(), tasks(nested=2, most_actions=6))
 SMALL = 2
 """States that a step of the search expands, so that parts of small spaces remain open."""
 
 
 @MANY
-@given(of=tasks(nested=2, most_actions=6))
+@given(of=SOME)
 def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> None:
     known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
@@ -47,7 +49,7 @@ def test_the_bounds_of_random_tasks_hold_the_exact_value_and_meet(of: Task) -> N
 
 
 @MANY
-@given(of=tasks(nested=2, most_actions=6))
+@given(of=SOME)
 def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
     known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
@@ -65,7 +67,7 @@ def test_the_bounds_hold_wherever_the_search_is_stopped(of: Task) -> None:
 
 
 @MANY
-@given(of=tasks(nested=2, most_actions=6), look=st.integers(4, 40))
+@given(of=SOME, look=st.integers(4, 40))
 def test_the_bounds_hold_whenever_the_search_is_interrupted(of: Task, look: int) -> None:
     known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
@@ -97,7 +99,7 @@ class Rumour:
 
 
 @MANY
-@given(of=tasks(nested=2, most_actions=6), seed=st.integers(0, 1000))
+@given(of=SOME, seed=st.integers(0, 1000))
 def test_bad_advice_costs_time_and_nothing_else(of: Task, seed: int) -> None:
     known = max_prob(explore_space(of, Limits()), Limits()).initial.exact
     assert known is not None
@@ -107,11 +109,11 @@ def test_bad_advice_costs_time_and_nothing_else(of: Task, seed: int) -> None:
 
 
 class Honest:
-    """Advice that says which action of a chain gets on."""
+    """Advice that says which step of a long way comes next."""
 
     def decide(self, state: int) -> int | None:
-        """The action of the first step that was not made."""
-        return next(at for at in range(41) if not state >> at + 1 & 1) if state & 1 else None
+        """Its number: those of the eight levers are lower."""
+        return 8 + next(at for at in range(42) if not state >> at + 1 & 1) if state & 1 else None
 
     def forbids(self, state: int, action: int) -> bool:
         """Never."""
@@ -119,17 +121,21 @@ class Honest:
 
 
 def test_advice_is_followed() -> None:
-    """A long chain, and twelve steps besides that lead nowhere."""
+    """A long sure way, which any of eight levers bars, and a short risky one that starts where it does."""
+    lost, levers = 41, range(42, 50)
+    untouched = [Is(each, F) for each in (lost, *levers)]
     steps = [
-        action(f"a{at:02}", conjunction([Is(at, T), Is(at + 1, F)]), ("9/10", {at + 1: T}), ("1/10", {}))
+        action(f"w{at:02}", conjunction([Is(at, T), Is(at + 1, F), *untouched]), ("1", {at + 1: T}))
         for at in range(40)
     ]
-    decoys = [action(f"z{at:02}", Is(41 + at, F), ("1", {41 + at: T})) for at in range(12)]
-    names = [f"s{at:02}" for at in range(41)] + [f"t{at:02}" for at in range(12)]
-    of = task(" ".join(names), {0: T}, Is(40, T), *steps, *decoys)
-    found = search_bounds(of, Limits(), advice=Honest())
-    assert found.bounds.exact == 1
-    assert found.space.expanded <= 40 + SMALLEST_STEP // 8
+    pulls = [action(f"p{at}", conjunction([Is(1, F), Is(at, F)]), ("1", {at: T})) for at in levers]
+    risk = action("x", conjunction([Is(1, F), Is(lost, F)]), ("1/2", {40: T}), ("1/2", {lost: T}))
+    names = [f"s{at:02}" for at in range(41)] + ["t", *(f"v{at}" for at in levers)]
+    of = task(" ".join(names), {0: T}, Is(40, T), *steps, *pulls, risk)
+    advised, alone = search_bounds(of, Limits(), advice=Honest()), search_bounds(of, Limits())
+    assert advised.bounds.exact == alone.bounds.exact == 1
+    assert advised.space.expanded < 60
+    assert alone.space.expanded > 200
 
 
 @MANY

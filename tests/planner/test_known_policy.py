@@ -28,6 +28,7 @@ from bbtc.planner.synthesis.decision_tree import decision_tree
 from bbtc.planner.synthesis.permissive import likely_policy, likely_way, one_policy
 from tests.long_form import amount
 from tests.planner.examples import public
+from tests.planner.journeys import journeys
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -37,6 +38,7 @@ CLOSE = 1e-7
 """What rounding may take from a bound."""
 
 MANY = examples(amount(100, 3000))
+SOME = st.one_of(journeys(), journeys(), tasks(nested=2, most_actions=6))
 STRATEGIES = ("policy", "strong-cyclic")
 
 
@@ -62,7 +64,7 @@ def is_written(of: Task, plan: Plan) -> None:
 @pytest.mark.parametrize("strategy", STRATEGIES)
 @pytest.mark.usefixtures("searched")
 @MANY
-@given(of=tasks(nested=2, most_actions=6), states=st.integers(1, 12), target=st.sampled_from(["1", "1/3"]))
+@given(of=SOME, states=st.integers(1, 12), target=st.sampled_from(["1", "1/3"]))
 def test_whatever_limit_on_states_ends_planning(strategy: str, of: Task, states: int, target: str) -> None:
     limits = Limits(states=max(states, len(of.initial)))
     is_written(of, plan_task(of, Fraction(target), strategy, limits, lambda _: None))
@@ -71,7 +73,7 @@ def test_whatever_limit_on_states_ends_planning(strategy: str, of: Task, states:
 @pytest.mark.parametrize("strategy", STRATEGIES)
 @pytest.mark.usefixtures("searched")
 @MANY
-@given(of=tasks(nested=2, most_actions=6), looks=st.integers(1, 150))
+@given(of=SOME, looks=st.integers(1, 150))
 def test_whenever_the_time_is_over(strategy: str, of: Task, looks: int) -> None:
     """By a clock that goes on by a hundredth of a second whenever it is looked at."""
     clock = itertools.count()
@@ -85,7 +87,7 @@ def test_whenever_the_time_is_over(strategy: str, of: Task, looks: int) -> None:
 @pytest.mark.parametrize("strategy", STRATEGIES)
 @pytest.mark.usefixtures("searched")
 @MANY
-@given(of=tasks(nested=2, most_actions=6))
+@given(of=SOME)
 def test_without_a_limit_it_is_the_best_there_is(strategy: str, of: Task) -> None:
     plan = plan_task(of, Fraction(1), strategy, Limits(), lambda _: None)
     is_written(of, plan)
@@ -137,7 +139,7 @@ def test_a_search_for_the_least_cost_that_takes_too_long_costs_no_success(
 
 
 @MANY
-@given(of=tasks(nested=2, most_actions=6))
+@given(of=SOME)
 def test_a_decision_tree_does_what_the_policy_does(of: Task) -> None:
     found = max_prob(explore_space(of, Limits()), Limits())
     root = decision_tree(of, one_policy(found), Limits())
@@ -147,7 +149,7 @@ def test_a_decision_tree_does_what_the_policy_does(of: Task) -> None:
 
 
 @MANY
-@given(of=tasks(nested=2, most_actions=6), most=st.integers(1, 4))
+@given(of=SOME, most=st.integers(1, 4))
 def test_a_tree_of_a_part_of_a_policy_ends_where_that_does(of: Task, most: int) -> None:
     found = max_prob(explore_space(of, Limits()), Limits())
     for part in (likely_policy(found, most), likely_way(found)):

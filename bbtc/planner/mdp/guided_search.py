@@ -24,7 +24,7 @@ _EQUAL = 1e-12  # values closer than this count as equal
 _REST = 1e-11  # values that move by less are at rest
 _SWEEPS = 200  # backups of a set of states in one visit, at most
 _AT_ONCE = 16  # states expanded at a time by :meth:`Guided.probe`
-_MOST_IDLE = 20  # passes that expand nothing, one after the other
+_MOST_IDLE = 20  # passes that expand and merge nothing, one after the other
 _FAR = 1e4  # what a dead end counts as, in actions
 
 Expand = Callable[[list[int]], Choices]
@@ -88,10 +88,11 @@ class Guided:
         change for long and nothing is to be expanded."""
         idle = 0
         while True:
+            merged = len(self._merged)
             tips, changed = self._pass()
             if not tips and not changed:
                 return all(self.settled[self._of(state)] for state in self.initial)
-            idle = 0 if tips else idle + 1
+            idle = 0 if tips or len(self._merged) > merged else idle + 1
             if idle > _MOST_IDLE:
                 return False
             while tips:

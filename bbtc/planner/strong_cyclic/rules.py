@@ -18,6 +18,7 @@ from bbtc.ground.condition import (
     Is,
     Known,
     conjunction,
+    conjuncts,
     disjunction,
     negation,
     replaced,
@@ -39,6 +40,7 @@ from bbtc.planner.strong_cyclic.partial_state import (
     without,
 )
 from bbtc.planner.strong_cyclic.policy import Covers
+from bbtc.planner.strong_cyclic.sharing import Guarded, factored
 from bbtc.planner.strong_cyclic.solve import Solved
 from bbtc.rewrite.simplify import numbered
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
@@ -229,16 +231,13 @@ def _joined(guards: Sequence[Guard]) -> tuple[Guard, ...]:
 
 def tree_of(task: Task, model: Determinised, rules: Sequence[Rule]) -> Node:
     """The rules as a tree."""
-    children: list[Node] = []
+    found: list[Guarded] = []
     for rule in rules:
         action = task.actions[rule.action]
-        guard = _condition(task, model, rule)
-        node: Node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
-        if guard != TRUE:
-            node = ControlNode("", "sequence", (ConditionNode("", guard), node))
-        children.append(node)
+        node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
+        found.append((conjuncts(_condition(task, model, rule)), node))
     goal = ConditionNode("", certainly(task, task.goal))
-    return numbered(ControlNode("", "fallback", (goal, *children)) if children else goal)
+    return numbered(ControlNode("", "fallback", (goal, *factored(task, found))) if found else goal)
 
 
 def _condition(task: Task, model: Determinised, rule: Rule) -> Condition:
