@@ -368,51 +368,51 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition(
-                    "(at(station) and known docked() and not docked() and patrol…",
-                    lambda: all_of(
-                        robot.at("station"),
-                        robot.docked() is not None,
-                        negated(robot.docked()),
-                        robot.patrolled("lobby"),
-                        robot.patrolled("store"),
+                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                fallback(
+                    "fallback",
+                    sequence(
+                        "sequence",
+                        Condition(
+                            "(at(station) and known docked() and not docked() and patrol…",
+                            lambda: all_of(
+                                robot.at("station"),
+                                robot.docked() is not None,
+                                negated(robot.docked()),
+                                robot.patrolled("store"),
+                            ),
+                        ),
+                        Latch(
+                            "dock(station)",
+                            lambda: robot.dock("station"),
+                            robot.cancel,
+                            keep=False,
+                        ),
                     ),
-                ),
-                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(patrolled(lobby) and patrolled(store))",
-                    lambda: all_of(robot.patrolled("lobby"), robot.patrolled("store")),
-                ),
-                Latch(
-                    "return_to_dock(station)",
-                    lambda: robot.return_to_dock("station"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                Latch(
-                    "scan(store)",
-                    lambda: robot.scan("store"),
-                    robot.cancel,
-                    guard=lambda: robot.at("store"),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                Latch(
-                    "drive(store)",
-                    lambda: robot.drive("store"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.battery("low")),
-                    keep=False,
+                    sequence(
+                        "sequence",
+                        Condition("patrolled(store)", lambda: robot.patrolled("store")),
+                        Latch(
+                            "return_to_dock(station)",
+                            lambda: robot.return_to_dock("station"),
+                            robot.cancel,
+                            keep=False,
+                        ),
+                    ),
+                    Latch(
+                        "scan(store)",
+                        lambda: robot.scan("store"),
+                        robot.cancel,
+                        guard=lambda: robot.at("store"),
+                        keep=False,
+                    ),
+                    Latch(
+                        "drive(store)",
+                        lambda: robot.drive("store"),
+                        robot.cancel,
+                        guard=lambda: negated(robot.battery("low")),
+                        keep=False,
+                    ),
                 ),
             ),
             Latch(

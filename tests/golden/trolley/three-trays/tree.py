@@ -312,33 +312,29 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "sequence",
                 Condition(
-                    "(strapped(tray1) and strapped(tray2) and strapped(tray3))",
-                    lambda: all_of(
-                        robot.strapped("tray1"),
-                        robot.strapped("tray2"),
-                        robot.strapped("tray3"),
-                    ),
-                ),
-                Latch(
-                    "push(ward)",
-                    lambda: robot.push("ward"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.trolley_at("ward")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
                     "(strapped(tray1) and strapped(tray2))",
                     lambda: all_of(robot.strapped("tray1"), robot.strapped("tray2")),
                 ),
-                Latch(
-                    "strap(tray3)",
-                    lambda: robot.strap("tray3"),
-                    robot.cancel,
-                    guard=lambda: robot.on("tray3"),
-                    keep=False,
+                fallback(
+                    "fallback",
+                    sequence(
+                        "sequence",
+                        Condition("strapped(tray3)", lambda: robot.strapped("tray3")),
+                        Latch(
+                            "push(ward)",
+                            lambda: robot.push("ward"),
+                            robot.cancel,
+                            guard=lambda: negated(robot.trolley_at("ward")),
+                            keep=False,
+                        ),
+                    ),
+                    Latch(
+                        "strap(tray3)",
+                        lambda: robot.strap("tray3"),
+                        robot.cancel,
+                        guard=lambda: robot.on("tray3"),
+                        keep=False,
+                    ),
                 ),
             ),
             sequence(
