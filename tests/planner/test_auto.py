@@ -73,10 +73,12 @@ def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
     of = task_of(problem)
     done, small = plan(of, "auto"), plan(of, "auto", prefer="size")
     assert done.tree.status == small.tree.status == "target-reached"
-    assert size(small) <= min(80, size(plan(of, "search", prefer="size")))
-    assert size(done) <= min(80, allowance(size(small)))
+    most = 110 if problem.domain == "hospital" else 80
+    assert size(small) <= min(most, size(plan(of, "search", prefer="size")))
+    assert size(done) <= min(most, allowance(size(small)))
     assert done.tree.success_probability >= small.tree.success_probability
-    assert problem.domain == "service-robot" or size(done) <= min(45, size(plan(of, "refine")))
+    few = problem.domain not in ("service-robot", "hospital")
+    assert not few or size(done) <= min(45, size(plan(of, "refine")))
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
