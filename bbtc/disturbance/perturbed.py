@@ -1,8 +1,8 @@
 """Runs of a tree in a world whose facts change by chance, and what came of them.
 
 Before every tick, the first one included, one change happens with a given probability
-(:meth:`bbtc.disturbance.facts.ChangingFacts.changes`). Then the root is ticked; if it starts an action, one
-of its outcomes applies before the next change. The rules of a tick are those of the exact simulation.
+(:meth:`bbtc.planner.changing_facts.ChangingFacts.changes`). Then the root is ticked; if it starts an action,
+one of its outcomes applies before the next change. The rules of a tick are those of the exact simulation.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from fractions import Fraction
 from bbtc.belief.state import Values, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.disturbance.execution import careful_actions
-from bbtc.disturbance.facts import ChangingFacts
 from bbtc.disturbance.intervals import Interval, wilson
 from bbtc.ground.condition import compile_condition
 from bbtc.ground.task import GroundAction, Task, charges_of, outcomes_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.tree.nodes import Node, actions_of
 
 RUNS = 10_000

@@ -22,13 +22,14 @@ attempts that follow one another put together (:mod:`bbtc.rewrite.repeat`); else
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from bbtc.belief.chain import explore
 from bbtc.belief.simulate import figures, success_of
+from bbtc.belief.state import Values
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -41,11 +42,13 @@ from bbtc.planner.finish import bound_attempts
 from bbtc.planner.guard import guarded
 from bbtc.planner.objective import Worth, best_of
 from bbtc.planner.options import DEFAULTS, Options
+from bbtc.planner.recovering import recovering_tree
 from bbtc.planner.result import Plan, Progress, Refinement
 from bbtc.planner.strong_cyclic.plan import plan_strong_cyclic
 from bbtc.planner.synthesis.policy import plan_policy
 from bbtc.rewrite.repeat import with_repeats
 from bbtc.rewrite.simplify import size
+from bbtc.tree.nodes import Node
 
 MANY_ACTIONS = 500
 """A task with more gets no second opinion once a tree meets the target."""
@@ -64,6 +67,9 @@ _LOOKS = 150
 
 _LOOKS_ELSEWHERE = 1500
 """The same for policies from states that others may leave the world in."""
+
+_MOST_RECOVERING = 60_000
+"""States for which a tree that recovers from anywhere is made."""
 
 _REFINE_STATES = 20_000
 """States of one simulation while refining for a second opinion."""
@@ -118,6 +124,7 @@ class _Auto:
     plans: list[Plan] = field(default_factory=list)
     elsewhere: Task | None = None
     """The task, beginning in states that others may leave it in."""
+    _recovery: dict[int, Fraction] = field(default_factory=dict)
 
     @property
     def best(self) -> Plan:
@@ -162,19 +169,27 @@ class _Auto:
         """How often a tree succeeds from where others may leave the world; 0 where that takes too long."""
         if self.elsewhere is None:
             return Fraction(0)
+        if id(plan) not in self._recovery:
+            self._recovery[id(plan)] = self._recovers(plan, self.elsewhere)
+        return self._recovery[id(plan)]
+
+    def _recovers(self, plan: Plan, elsewhere: Task) -> Fraction:
         few = replace(self.limits, states=min(self.limits.states, _REFINE_STATES))
         try:
-            return success_of(explore(self.elsewhere, plan.tree.root, few))
+            return success_of(explore(elsewhere, plan.tree.root, few))
         except LimitReached:
             return Fraction(0)
 
     def go_on_from_elsewhere(self) -> None:
         """Policies that hold from where others may leave the world, too. Raises ``LimitReached``."""
         task, best = self.task, self.best
-        if not best.tree.success_probability or len(task.actions) > MANY_ACTIONS:
+        if not task.actions or len(task.actions) > MANY_ACTIONS or not best.tree.success_probability:
             return
-        starts = starts_elsewhere(task, self.limits)
+        starts = starts_elsewhere(task, self.limits, _visited(best))
         if not starts:
+            return
+        self.elsewhere = only_at(task, starts)
+        if self.recovers():
             return
         few = replace(self.limits, states=max(1, STATES_AND_ACTIONS // len(task.actions)))
         with suppress(LimitReached):
@@ -182,7 +197,19 @@ class _Auto:
             self.add_for_own_starts(plan_policy(wider, self.target, few, _silent, self.inner, whole=True))
         if any(plan.tree.success_probability == 1 and plan.chain is not None for plan in self.plans):
             self.surely_from(starts)
-        self.elsewhere = only_at(task, starts)
+
+    def recovers(self) -> bool:
+        """Rules for all states that actions lead to; is there nothing better?"""
+        most = min(self.limits.states, _MOST_RECOVERING, max(1, _WORK_FOR_LARGE // len(self.task.actions)))
+        limits = replace(self.limits.part(_SURE_SHARE), states=most, effort=Effort(_LOOKS_ELSEWHERE))
+        try:
+            root = recovering_tree(self.task, limits)
+            if root is None:
+                return False
+            self.add_tree(root)
+        except LimitReached:
+            return False
+        return self.best is self.plans[-1]
 
     def surely_from(self, starts: Sequence[tuple[Truth, ...]]) -> None:
         """A policy over partial states for those of the starts from which one surely reaches the goal."""
@@ -204,7 +231,10 @@ class _Auto:
         """Take the tree of a plan for other starts into account. Raises ``LimitReached``."""
         if plan.tree.status == "interrupted":
             raise KeyboardInterrupt
-        root = plan.tree.root
+        self.add_tree(plan.tree.root)
+
+    def add_tree(self, root: Node) -> None:
+        """Take a tree into account. Raises ``LimitReached``."""
         chain = explore(self.task, root, replace(self.limits, states=min(self.limits.states, _REFINE_STATES)))
         best = BestTree(self.task, self.target, outer=self.options.best)
         best.take(root, chain, success_of(chain))
@@ -258,6 +288,11 @@ class _Auto:
             return _refined(self.task, self.target, self.limits, most, self.options)
         except LimitReached:  # not even the goal alone is small enough
             return None
+
+
+def _visited(plan: Plan) -> Iterable[Values]:
+    """The states that runs visit, as far as they are known."""
+    return () if plan.chain is None else (state.values for state in plan.chain.states)
 
 
 def _best(task: Task, target: Fraction, limits: Limits, options: Options, refined: Plan | None) -> Plan:

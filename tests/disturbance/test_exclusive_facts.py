@@ -11,12 +11,12 @@ import pytest
 
 import bbtc
 from bbtc.belief.state import Values
-from bbtc.disturbance.facts import ChangingFacts
-from bbtc.disturbance.mutexes import exclusive_groups
 from bbtc.ground.condition import TRUE, Condition, Is, conjunction
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.planner.changing_facts import ChangingFacts
+from bbtc.planner.mutexes import exclusive_groups
 from bbtc.source import SourceFile
 from tests.disturbance.reference import reachable
 from tests.long_form import amount

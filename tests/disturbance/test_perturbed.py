@@ -15,11 +15,11 @@ from random import Random
 import pytest
 
 import bbtc
-from bbtc.disturbance.facts import ChangingFacts
 from bbtc.disturbance.intervals import wilson
 from bbtc.disturbance.perturbed import PerturbedRuns, perturbed_runs
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 from tests.cli.program import bbtc as program
 from tests.disturbance.reference import Changes, Exact, State

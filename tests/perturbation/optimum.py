@@ -13,9 +13,9 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.disturbance.facts import ChangingFacts
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.planner.changing_facts import ChangingFacts
 from tests.disturbance.reference import State, best_chances, outcomes_in
 from tests.replay.reference import value_of
 

@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bbtc.belief.chain import explore
+from bbtc.belief.simulate import success_of
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick
 from bbtc.diagnostics import Report
 from bbtc.ground.condition import Is, evaluate
@@ -16,6 +18,7 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
+from bbtc.planner.elsewhere import only_at, starts_elsewhere
 from bbtc.planner.objective import Worth, allowance, best_of
 from bbtc.planner.options import Options, Prefer
 from bbtc.planner.result import Plan, Refinement
@@ -64,8 +67,14 @@ def test_auto_is_no_worse_than_the_other_strategies(of: Task, prefer: Prefer) ->
         if prefer == "size":
             assert size(auto) <= size(other)
         elif size(other) <= allowance(1) and strategy != "refine":  # what nothing smaller can forbid
-            worths = [Worth.of(each) for each in (auto, other)]
+            worths = [Worth.of(each, from_elsewhere(of, each)) for each in (auto, other)]
             assert best_of(worths, Fraction("0.9"), prefer) == 0
+
+
+def from_elsewhere(of: Task, done: Plan) -> Fraction:
+    """How often a tree succeeds from where others may leave the world."""
+    starts = starts_elsewhere(of, Limits())
+    return success_of(explore(only_at(of, starts), done.tree.root, Limits())) if starts else Fraction(0)
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)

@@ -193,13 +193,17 @@ def test_an_interrupted_search_leaves_what_it_knows(
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as on POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_planning_with_a_tree(tmp_path: Path, number: signal.Signals) -> None:
-    """Many switches: more states than can be explored in the time."""
-    switches = " ".join(f"(s{i})" for i in range(60))
-    actions = " ".join(f"(:action on{i} :precondition (not (s{i})) :effect (s{i}))" for i in range(60))
-    goal = " ".join(f"(s{i})" for i in range(60))
-    file = tmp_path / "switches.pddl"
+    """Many coins, and how each fell is remembered: every policy leads to more states than can be explored."""
+    facts = " ".join(f"(heads{i}) (tails{i})" for i in range(60))
+    actions = " ".join(
+        f"(:action toss{i} :precondition (not (or (heads{i}) (tails{i})))"
+        f" :effect (probabilistic 1/2 (heads{i}) 1/2 (tails{i})))"
+        for i in range(60)
+    )
+    goal = " ".join(f"(or (heads{i}) (tails{i}))" for i in range(60))
+    file = tmp_path / "tosses.pddl"
     file.write_text(
-        f"(define (domain d) (:predicates {switches}) {actions})"
+        f"(define (domain d) (:predicates {facts}) {actions})"
         f"(define (problem p) (:domain d) (:init) (:goal (and {goal})))"
     )
     command = [sys.executable, "-m", "bbtc.cli.main", "plan", str(file), "--strategy", "policy"]

@@ -13,11 +13,11 @@ from fractions import Fraction
 
 from bbtc.belief.state import Values, initial_belief
 from bbtc.disturbance.execution import careful_actions
-from bbtc.disturbance.facts import ChangingFacts
 from bbtc.disturbance.perturbed import Draw, bits_of, threshold
 from bbtc.ground.condition import evaluate
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.replay.engines import Replay
 from bbtc.tree.nodes import Tree
 

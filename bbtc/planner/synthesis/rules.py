@@ -81,7 +81,7 @@ class Learner:
 
     def __init__(self, task: Task, policy: MultiPolicy, limits: Limits) -> None:
         self.task, self.policy, self.limits = task, policy, limits
-        self.literals = _literals(policy.values)
+        self.literals = literals_of(policy.values)
         columns = [literal.holds(policy.values) for literal in self.literals]
         self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(policy.goal), len(self.literals))
         self.taken = np.ones(len(policy.choice_action), dtype=np.bool_)
@@ -140,35 +140,41 @@ class Learner:
 
     def _grow(self, action: int, wanted: Index, others: Index) -> tuple[tuple[int, ...], Index]:
         """A conjunction that holds in some of the wanted states and in none of the others."""
-        own = self._own_literals(action)
-        inside, outside = self.holds[wanted], self.holds[others]
-        chosen: list[int] = []
-        while len(outside):
-            hits, misses = inside.sum(axis=0), outside.sum(axis=0)
-            useful = (hits > 0) & (misses < len(outside))
-            share = np.log2(np.maximum(hits, 1) / np.maximum(hits + misses, 1))
-            gain = hits * (share - np.log2(len(inside) / (len(inside) + len(outside))))
-            gain = np.where(useful, gain + own * 1e-6, -np.inf)
-            column = int(np.argmax(gain))
-            chosen.append(column)
-            inside, outside = inside[inside[:, column]], outside[outside[:, column]]
-        # Drop tests that later ones made needless, the first chosen first.
-        for column in list(chosen):
-            rest = [c for c in chosen if c != column]
-            if not self.holds[others][:, rest].all(axis=1).any():
-                chosen = rest
+        chosen = separating(self.holds[wanted], self.holds[others], self._own_literals(action))
         covered = wanted[self.holds[wanted][:, chosen].all(axis=1)]
         return tuple(chosen), covered
 
     def _own_literals(self, action: int) -> npt.NDArray[np.float64]:
         """1 for literals that the action's precondition states: they read best."""
         if action not in self._own:
-            own = frozenset(_stated(self.task.actions[action].precondition))
+            own = frozenset(stated(self.task.actions[action].precondition))
             self._own[action] = np.array([float(literal in own) for literal in self.literals])
         return self._own[action]
 
 
-def _literals(values: npt.NDArray[np.uint8]) -> list[Literal]:
+def separating(wanted: Flags, others: Flags, own: npt.NDArray[np.float64]) -> list[int]:
+    """Literals (columns) that all hold in some of the wanted states (rows), and in none of the others. Of
+    literals that do as well, one with the greater ``own`` is taken."""
+    inside, outside = wanted, others
+    chosen: list[int] = []
+    while len(outside):
+        hits, misses = inside.sum(axis=0), outside.sum(axis=0)
+        useful = (hits > 0) & (misses < len(outside))
+        share = np.log2(np.maximum(hits, 1) / np.maximum(hits + misses, 1))
+        gain = hits * (share - np.log2(len(inside) / (len(inside) + len(outside))))
+        gain = np.where(useful, gain + own * 1e-6, -np.inf)
+        column = int(np.argmax(gain))
+        chosen.append(column)
+        inside, outside = inside[inside[:, column]], outside[outside[:, column]]
+    # Drop tests that later ones made needless, the first chosen first.
+    for column in list(chosen):
+        rest = [c for c in chosen if c != column]
+        if not others[:, rest].all(axis=1).any():
+            chosen = rest
+    return chosen
+
+
+def literals_of(values: npt.NDArray[np.uint8]) -> list[Literal]:
     """The literals that tell some of the states apart, one of each set that hold alike."""
     found: dict[bytes, Literal] = {}
     for variable in range(values.shape[1]):
@@ -184,7 +190,8 @@ def _literals(values: npt.NDArray[np.uint8]) -> list[Literal]:
     return sorted(found.values())
 
 
-def _stated(condition: Condition) -> list[Literal]:
+def stated(condition: Condition) -> list[Literal]:
+    """The literals of a condition."""
     tests = {Truth.TRUE: Test.TRUE, Truth.FALSE: Test.FALSE, Truth.UNKNOWN: Test.UNKNOWN}
     return [
         Literal(leaf.variable, tests[leaf.value] if isinstance(leaf, Is) else Test.KNOWN)

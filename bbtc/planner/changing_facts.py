@@ -1,7 +1,7 @@
 """What may change by itself in the world of a task, and what else has to change with it.
 
 A change moves one fact, or one group of facts of which at most one is true (a robot's place), to another
-value. Groups are those of :mod:`bbtc.disturbance.mutexes`. A fact moves in one group at most, the largest
+value. Groups are those of :mod:`bbtc.planner.mutexes`. A fact moves in one group at most, the largest
 first, as in Helmert, "Concise finite-domain representations for PDDL planning tasks" (2009), section 6; the
 other groups still bound what is possible: what a move contradicts gives way, with as few facts as can be, so
 that a can that falls from the gripper leaves it empty.
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from bbtc.belief.state import Values
-from bbtc.disturbance.mutexes import Group, exclusive_groups
 from bbtc.ground.task import Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.planner.mutexes import Group, exclusive_groups
 
 _MOST_GIVING_WAY = 6  # facts that change besides those that move
 _MOST_TRIED = 2000  # sets of such facts

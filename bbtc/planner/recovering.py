@@ -1,0 +1,297 @@
+"""Rules for every state that actions lead to, or others may, and not only for those that a plan visits.
+
+1. All states that any actions lead to are explored, and what one change
+   (:mod:`bbtc.planner.changing_facts`) and any actions make of some of them.
+2. P* and the least cost V are found for all of them.
+3. A state that runs visit may take the choices that attain V, as in :mod:`bbtc.planner.synthesis.permissive`;
+   any other one those that attain P* and cost little more, since that costs the runs nothing.
+4. Rules are learnt one by one, as in :mod:`bbtc.planner.synthesis.rules`, but for their guards: an action
+   reads its precondition by itself, so a rule tells apart only states in which that is not false, and most
+   rules need no test at all. What a rule decides must leave a way to the goal from everywhere; choices that
+   would not are given up. States that no run visits any more are free to take what is near enough.
+5. Last come rules for states without hope that only others lead to: an action, if possible one that the tree
+   has, is tried until others have put things right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from bbtc.belief.state import initial_belief
+from bbtc.diagnostics import LimitReached
+from bbtc.ground.condition import FALSE, TRUE, conjuncts
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.planner.changing_facts import ChangingFacts
+from bbtc.planner.elsewhere import MOST_VISITED, also_at, changed, spread
+from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.graph import Floats, draw_probabilities, sums
+from bbtc.planner.mdp.maxprob import MaxProb, max_prob
+from bbtc.planner.mdp.packing import Flags, bit_test, holds
+from bbtc.planner.mdp.ssp import least_cost
+from bbtc.planner.mdp.state_space import StateSpace
+from bbtc.planner.mdp.transitions import Index
+from bbtc.planner.strong_cyclic.rules import certainly
+from bbtc.planner.strong_cyclic.sharing import Guarded, factored
+from bbtc.planner.synthesis.rules import Literal, literals_of, separating, stated
+from bbtc.rewrite.simplify import numbered
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+
+_NEAR = 1.5
+"""A choice off the way may lead to where V is by so much of its own cost more than it should be."""
+
+_FALLING = 0.95
+"""Choices that lead to where V is at most so much too high get on in any case: expected cost falls."""
+
+_CLOSE = 1e-9
+
+_FEW_STATES = 2_000
+"""Where there are no more, all that may change is looked at in each of them, again and again."""
+
+
+def recovering_tree(task: Task, limits: Limits) -> Node | None:
+    """A tree of the least expected cost among those of the best success probability, which does what it can
+    from anywhere else; None where costs are not known. Raises ``LimitReached``."""
+    space = _wide_space(task, limits)
+    found = max_prob(space, limits)
+    cost = least_cost(found, limits)
+    if cost is None:
+        return None
+    rates = np.array([float(draw.cost) for draw in space.draws] or [0.0])
+    count = len(space.choice_action)
+    weight = draw_probabilities(space)
+    own = sums(space.edge_choice, weight * rates[space.edge_draw], count)
+    onward = sums(space.edge_choice, weight * cost.values[space.edge_successor], count)
+    more = own + onward - cost.values[space.choice_state] - _CLOSE * (1 + cost.values[space.choice_state])
+    choices = _Choices(
+        best=cost.best, near=found.best & (more <= _NEAR * own), falling=found.best & (more <= _FALLING * own)
+    )
+    learner = _Learner(task, found, choices, limits)
+    return _tree(task, [*learner.deciding(), *learner.waiting()])
+
+
+def _wide_space(task: Task, limits: Limits) -> StateSpace:
+    """All that any actions lead to, also behind the goal and from where others may leave some states, all of
+    them if they are few. Choices of goal states are left out. Raises ``LimitReached``."""
+    endless = replace(task, goal=FALSE)
+    space = _whole(endless, limits)
+    facts = ChangingFacts.of(task, limits)
+    own = initial_belief(task)
+    wider = endless
+    while True:
+        states = [space.packing.values(space.states, row) for row in range(len(space.states))]
+        few = len(states) <= _FEW_STATES
+        known = set(states)
+        starts = changed(facts, states if few else spread(states, MOST_VISITED), limits)
+        new = [tuple(map(Truth, values)) for values in starts if values not in known]
+        if not new:
+            break
+        wider = also_at(endless, [*[each.values for each in wider.initial[len(endless.initial) :]], *new])
+        try:
+            space = _whole(wider, limits)
+        except LimitReached:
+            limits.check_time("the search for a tree that recovers")
+            break
+        if not few:
+            break
+    numbers = dict(zip(initial_belief(wider), (number for _, number in space.initial), strict=False))
+    goal = holds(space.packing, bit_test(space.packing, task.goal), space.states)
+    kept = ~goal[space.choice_state]
+    edges = kept[space.edge_choice]
+    return replace(
+        space,
+        task=task,
+        goal=goal,
+        choice_state=space.choice_state[kept],
+        choice_action=space.choice_action[kept],
+        edge_choice=(np.cumsum(kept) - 1)[space.edge_choice[edges]].astype(np.int32),
+        edge_successor=space.edge_successor[edges],
+        edge_draw=space.edge_draw[edges],
+        initial=tuple((probability, numbers[values]) for values, probability in own.items()),
+    )
+
+
+def _whole(task: Task, limits: Limits) -> StateSpace:
+    space = explore_space(task, limits)
+    if space.stop is not None:
+        raise LimitReached([space.stop])
+    return space
+
+
+@dataclass(frozen=True, slots=True)
+class _Choices:
+    """Choices that attain the least cost (``best``), all that are ``near`` enough elsewhere, and of these the
+    ones after which the expected cost falls."""
+
+    best: Flags
+    near: Flags
+    falling: Flags
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """Start ``action`` (its number in the task) where its precondition and all of ``tests`` hold."""
+
+    tests: tuple[int, ...]
+    action: int
+
+
+class _Learner:
+    """Finds the rules."""
+
+    def __init__(self, task: Task, found: MaxProb, choices: _Choices, limits: Limits) -> None:
+        self.task, self.choices, self.limits = task, choices, limits
+        self.graph, self.space = found.graph, found.space
+        space = found.space
+        self.hopeful = ~found.prob_0 & ~space.goal
+        values = space.packing.unpack(space.states)
+        self.literals = literals_of(values)
+        columns = [literal.holds(values) for literal in self.literals]
+        self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(values), len(columns))
+        self.given_up = np.zeros(len(space.choice_action), dtype=np.bool_)
+        self.decided = np.full(len(values), -1, dtype=np.int64)
+        """The action of each state that a rule decides."""
+        self.undecided = self.hopeful.copy()
+        self.rules: list[_Rule] = []
+        self._starts: dict[int, Flags] = {}
+
+    # --- what may be chosen where -----------------------------------------------------------------
+
+    def _taken(self, decided: npt.NDArray[np.int64], visited: Flags) -> Flags:
+        """The choices that are taken, or may still be."""
+        at = self.space.choice_state
+        free = np.where(visited[at], self.choices.best, self.choices.near) & ~self.given_up
+        taken: Flags = np.where(decided[at] >= 0, self.space.choice_action == decided[at], free)
+        return taken & self.hopeful[at]
+
+    def _visited(self) -> Flags:
+        """The states that runs may visit."""
+        at = self.space.choice_state
+        own = self.decided[at]
+        taken = np.where(own >= 0, self.space.choice_action == own, self.choices.best) & self.hopeful[at]
+        found = np.zeros(len(self.decided), dtype=np.bool_)
+        found[self.space.closure(self.space.start, taken)] = True
+        return found
+
+    def _may_start(self, action: int) -> Flags:
+        """Where an action's precondition is not false: unknown, it would be waited for."""
+        if action not in self._starts:
+            prevented = bit_test(self.space.packing, self.task.actions[action].precondition, False)
+            self._starts[action] = ~holds(self.space.packing, prevented, self.space.states)
+        return self._starts[action]
+
+    # --- rules ------------------------------------------------------------------------------------
+
+    def deciding(self) -> Iterator[tuple[tuple[Literal, ...], int]]:
+        """The rules that lead to the goal."""
+        visited = self._visited()
+        while True:
+            self.limits.check_time("the search for a tree that recovers")
+            taken = self._taken(self.decided, visited)
+            stuck = visited & ~self.hopeful & ~self.space.goal
+            found = self._best(taken, stuck)
+            if found is None:
+                return
+            rule, covered = found
+            decided = self.decided.copy()
+            decided[covered] = rule.action
+            before = self.graph.reach(self.space.goal, taken).found
+            after = self.graph.reach(self.space.goal, self._taken(decided, visited)).found
+            if self._given_up(rule.action, covered, before & ~after):
+                continue
+            self.decided = decided
+            self.undecided[covered] = False
+            visited = self._visited()
+            self.rules.append(rule)
+            yield self._stated(rule)
+
+    def _given_up(self, action: int, covered: Index, lost: Flags) -> bool:
+        """Give up choices of an action that would leave some states without a way; are there any?"""
+        if not lost.any():
+            return False
+        culprits = np.zeros(len(lost), dtype=np.bool_)
+        culprits[covered[lost[covered]] if lost[covered].any() else covered] = True
+        own = culprits[self.space.choice_state] & (self.space.choice_action == action) & ~self.given_up
+        roundabout = own & ~self.choices.falling
+        self.given_up |= roundabout if roundabout.any() else own
+        return bool(own.any())
+
+    def _best(self, taken: Flags, stuck: Flags) -> tuple[_Rule, Index] | None:
+        """The rule that decides most states for its size, and these."""
+        open_choices = taken & self.undecided[self.space.choice_state]
+        best: tuple[tuple[float, int], _Rule, Index] | None = None
+        for action in np.unique(self.space.choice_action[open_choices]).tolist():
+            able = np.zeros(len(stuck), dtype=np.bool_)
+            able[self.space.choice_state[open_choices & (self.space.choice_action == action)]] = True
+            against = (self.undecided & ~able | stuck) & self._may_start(action)
+            wanted, others = np.flatnonzero(able), np.flatnonzero(against)
+            at_best = (-len(wanted) / 3, 1) if len(others) else (-float(len(wanted)), 0)
+            if best is not None and best[0] <= at_best:
+                continue
+            tests = separating(self.holds[wanted], self.holds[others], self._own(action))
+            covered = wanted[self.holds[wanted][:, tests].all(axis=1)]
+            key = (-len(covered) / _size(tests), len(tests))
+            if best is None or key < best[0]:
+                best = key, _Rule(tuple(tests), action), covered
+        return None if best is None else best[1:]
+
+    def waiting(self) -> Iterator[tuple[tuple[Literal, ...], int]]:
+        """Rules for states without hope that no run visits; first of actions that the tree has."""
+        visited = self._visited()
+        stuck = visited & ~self.hopeful & ~self.space.goal
+        idle = ~self.hopeful & ~self.space.goal & ~visited
+        for rule in self.rules:
+            idle &= ~(self.holds[:, rule.tests].all(axis=1) & self._may_start(rule.action))
+        used = {rule.action for rule in self.rules}
+        for actions in (sorted(used), [a for a in range(len(self.task.actions)) if a not in used]):
+            while True:
+                found = self._best_wait(actions, idle, stuck)
+                if found is None:
+                    break
+                rule, covered = found
+                idle &= ~covered
+                yield self._stated(rule)
+
+    def _best_wait(self, actions: list[int], idle: Flags, stuck: Flags) -> tuple[_Rule, Flags] | None:
+        best: tuple[float, _Rule, Flags] | None = None
+        for action in actions:
+            wanted = idle & self._may_start(action)
+            if not wanted.any():
+                continue
+            others = self.holds[stuck & self._may_start(action)]
+            tests = separating(self.holds[wanted], others, self._own(action))
+            covered = wanted & self.holds[:, tests].all(axis=1)
+            key = -int(covered.sum()) / _size(tests)
+            if best is None or key < best[0]:
+                best = key, _Rule(tuple(tests), action), covered
+        return None if best is None else best[1:]
+
+    def _own(self, action: int) -> Floats:
+        """1 for literals that the action's precondition states: they read best."""
+        own = frozenset(stated(self.task.actions[action].precondition))
+        return np.array([float(literal in own) for literal in self.literals])
+
+    def _stated(self, rule: _Rule) -> tuple[tuple[Literal, ...], int]:
+        return tuple(self.literals[test] for test in rule.tests), rule.action
+
+
+def _size(tests: list[int]) -> int:
+    """The nodes of a rule."""
+    return len(tests) + 2 if tests else 1
+
+
+def _tree(task: Task, rules: list[tuple[tuple[Literal, ...], int]]) -> Node:
+    """The rules as a tree. Nothing that is read is ever unknown, but for an action's precondition."""
+    found: list[Guarded] = []
+    for tests, number in rules:
+        action = task.actions[number]
+        node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
+        needed = [certainly(task, literal.condition) for literal in tests]
+        found.append((tuple(part for each in needed for part in conjuncts(each)), node))
+    goal = ConditionNode("", certainly(task, task.goal))
+    return numbered(ControlNode("", "fallback", (goal, *factored(task, found))) if found else goal)

@@ -1,0 +1,116 @@
+"""Trees that recover: from every state that actions lead to they attain the best there is, and their runs
+are those of the cheapest among the best policies, beside value iteration, an interpreter and the solvers."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bbtc.belief.chain import explore
+from bbtc.belief.simulate import figures
+from bbtc.diagnostics import LimitReached
+from bbtc.disturbance.perturbed import perturbed_runs
+from bbtc.disturbance.recovery import recovery
+from bbtc.ground.condition import FALSE, Is
+from bbtc.ground.task import Task
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.planner.bounds import task_value
+from bbtc.planner.guard import guarded
+from bbtc.planner.recovering import recovering_tree
+from bbtc.tree.nodes import ActionNode, ControlNode
+from bbtc.verifier.verdict import verify
+from tests.disturbance.reference import Exact, best_chances, reachable
+from tests.domains.problems import PROBLEMS, Problem, task_of
+from tests.long_form import amount
+from tests.planner.journeys import journeys
+from tests.planner.test_auto import plan
+from tests.planner.test_refine import action, task
+from tests.profiles import examples
+from tests.strategies import tasks
+
+T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
+LARGE = ("service-robot", "hospital")
+
+
+@examples(amount(150, 3000))
+@given(of=st.one_of(journeys(), tasks(most_actions=4)))
+def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) -> None:
+    root = recovering_tree(of, Limits())
+    states = reachable(of)
+    if root is None or states is None:
+        return
+    best = best_chances(of, states)
+    exact = Exact(of, root, 0.0, lambda state: [])
+    for state in states:
+        assert exact.chances(3000, state)["success"] == pytest.approx(best[state], abs=1e-6)
+
+
+@examples(amount(150, 3000))
+@given(of=st.one_of(journeys(), tasks(most_actions=4)))
+def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
+    root = recovering_tree(of, Limits())
+    if root is None:
+        return
+    value = task_value(of, Limits(), costs=True)
+    done = figures(of, root, explore(of, root, Limits()))
+    assert done.success == value.lower
+    assert done.cost is not None
+    assert value.cost is not None
+    assert done.cost == pytest.approx(value.cost, abs=1e-9)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_trees_of_our_domains_recover(problem: Problem) -> None:
+    of = task_of(problem)
+    if problem.domain in LARGE and problem.name != "after-the-alarm":
+        pytest.skip("too many states for each")
+    done = plan(of, "auto")
+    found = recovery(of, done.tree.root, Limits())
+    assert (found.attained, found.missed) == (found.hopeful, 0)
+    assert verify(guarded(done).tree, Limits(), "own").problems == ()
+    disturbed = perturbed_runs(of, done.tree.root, Fraction(1, 10), Limits(), runs=300)
+    assert (disturbed.unready, disturbed.missed) == (0, 0)
+
+
+def test_rules_need_no_test_where_the_guards_of_their_actions_tell() -> None:
+    """From a to b to c, with a way back from c to a that nobody needs."""
+    goes = [
+        action("first", Is(0, T), ("9/10", {0: F, 1: T}), ("1/10", {})),
+        action("second", Is(1, T), ("1", {1: F, 2: T})),
+        action("back", Is(2, T), ("1", {2: F, 0: T})),
+    ]
+    of = task("a b c", {0: T}, Is(2, T), *goes)
+    root = recovering_tree(of, Limits())
+    assert isinstance(root, ControlNode)
+    found = [rule for rule in root.children if isinstance(rule, ActionNode) and rule.guarded]
+    assert {rule.action for rule in found} == {"first()", "second()"}
+    assert len(root.children) == 1 + len(found)
+
+
+def test_where_only_others_can_help_it_tries_again() -> None:
+    """A door that others have locked cannot be opened; pulling at it goes on until they unlock it."""
+    pull = action("pull", Is(0, F), ("1/2", {1: T}), ("1/2", {}))
+    lock = action("lock", Is(1, T), ("1", {0: T, 1: F}))
+    knock = action("knock", Is(0, T), ("1", {2: T}))
+    of = task("locked open heard", {}, Is(1, T), pull, lock, knock)
+    root = recovering_tree(of, Limits())
+    assert root is not None
+    tried = perturbed_runs(of, root, Fraction(1, 5), Limits(), runs=500)
+    assert tried.success == 1
+
+
+def test_nothing_is_done_where_nothing_helps() -> None:
+    of = task("a", {}, FALSE, action("vain", Is(0, F), ("1", {0: T})))
+    root = recovering_tree(of, Limits())
+    assert root is not None
+    assert figures(of, root, explore(of, root, Limits())).cost == 0
+
+
+def test_more_states_than_allowed_are_a_limit() -> None:
+    (problem,) = [each for each in PROBLEMS if str(each) == "charging/night-round"]
+    with pytest.raises(LimitReached):
+        recovering_tree(task_of(problem), Limits(states=10))
