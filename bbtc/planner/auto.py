@@ -12,8 +12,10 @@
    the target can be reached.
 5. Refine greedily, as published, where nothing met the target, or, if the smallest tree is asked for, in as
    many nodes as would make a smaller one than those found.
-6. Unless the world is closed or the smallest tree is asked for, plan as in 2 and 3 once more, for what others
-   may make of the initial state, too (:mod:`bbtc.planner.elsewhere`).
+6. Unless the world is closed, learn rules for all states that actions lead to, or others may
+   (:mod:`bbtc.planner.recovering`). Where that takes too long, or does not help, and the smallest tree is not
+   asked for, plan as in 2 and 3 once more, for what others may make of visited states, too
+   (:mod:`bbtc.planner.elsewhere`).
 
 ``advised``, the default: templates are their author's advice on how things are done, and only refinement
 follows it. Where a task has templates, and refinement meets the target, its tree is taken, with equal
@@ -161,7 +163,7 @@ class _Auto:
                 self.add(step())
         if not self.interrupted:
             self.add(self.refinement(refined))
-        if not self.interrupted and not options.closed_world and options.prefer != "size":
+        if not self.interrupted and not options.closed_world:
             with suppress(LimitReached):
                 self.go_on_from_elsewhere()
 
@@ -189,7 +191,7 @@ class _Auto:
         if not starts:
             return
         self.elsewhere = only_at(task, starts)
-        if self.recovers():
+        if self.recovers() or self.options.prefer == "size":
             return
         few = replace(self.limits, states=max(1, STATES_AND_ACTIONS // len(task.actions)))
         with suppress(LimitReached):

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +51,9 @@ _FALLING = 0.95
 
 _CLOSE = 1e-9
 
+_LITTLE = Fraction(1, 1000)
+"""What an action without cost counts as, of the least cost there is."""
+
 _FEW_STATES = 2_000
 """Where there are no more, all that may change is looked at in each of them, again and again."""
 
@@ -59,18 +63,9 @@ def recovering_tree(task: Task, limits: Limits) -> Node | None:
     from anywhere else; None where costs are not known. Raises ``LimitReached``."""
     space = _wide_space(task, limits)
     found = max_prob(space, limits)
-    cost = least_cost(found, limits)
-    if cost is None:
+    choices = _choices(found, limits)
+    if choices is None:
         return None
-    rates = np.array([float(draw.cost) for draw in space.draws] or [0.0])
-    count = len(space.choice_action)
-    weight = draw_probabilities(space)
-    own = sums(space.edge_choice, weight * rates[space.edge_draw], count)
-    onward = sums(space.edge_choice, weight * cost.values[space.edge_successor], count)
-    more = own + onward - cost.values[space.choice_state] - _CLOSE * (1 + cost.values[space.choice_state])
-    choices = _Choices(
-        best=cost.best, near=found.best & (more <= _NEAR * own), falling=found.best & (more <= _FALLING * own)
-    )
     learner = _Learner(task, found, choices, limits)
     return _tree(task, [*learner.deciding(), *learner.waiting()])
 
@@ -131,6 +126,32 @@ class _Choices:
     best: Flags
     near: Flags
     falling: Flags
+
+
+def _choices(found: MaxProb, limits: Limits) -> _Choices | None:
+    cheapest = least_cost(found, limits)
+    if cheapest is None:
+        return None
+    best, space = cheapest.best, found.space
+    costs = [draw.cost for draw in space.draws]
+    if not all(costs):
+        # What costs nothing could go on for ever: of equally cheap choices, those of the fewest actions.
+        narrowed = replace(found, policy=cheapest.policy, best=best)
+        cheapest = least_cost(narrowed, limits, [Fraction(1)] * len(costs))
+        assert cheapest is not None
+        best = cheapest.best
+        least = min((cost for cost in costs if cost > 0), default=Fraction(1)) * _LITTLE
+        costs = [cost or least for cost in costs]
+        cheapest = least_cost(found, limits, costs)
+        assert cheapest is not None
+    count = len(space.choice_action)
+    weight = draw_probabilities(space)
+    rates = np.array([float(cost) for cost in costs] or [0.0])
+    own = sums(space.edge_choice, weight * rates[space.edge_draw], count)
+    onward = sums(space.edge_choice, weight * cheapest.values[space.edge_successor], count)
+    values = cheapest.values[space.choice_state]
+    more = own + onward - values - _CLOSE * (1 + values)
+    return _Choices(best, found.best & (more <= _NEAR * own), found.best & (more <= _FALLING * own))
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,15 +25,15 @@ ALMOST = {Problem("service-robot", "two-goals"): Fraction(97, 100)}
 
 
 FALLS_SHORT: dict[Kind, set[str]] = {
-    "success": {str(problem) for problem in CONTESTED} - {"inspection/shut-down"},
-    "cost": {"delivery/letter-for-anna"},
-    "nodes": {
+    "success": {
         "delivery/letter-for-anna",
-        "doors/to-the-archive",
         "household/look-for-soda",
-        "inspection/shut-down",
         "kitting/gift-set",
+        "trolley/with-spares",
+        "warehouse/one-order",
     },
+    "cost": {"delivery/letter-for-anna"},
+    "nodes": {"delivery/letter-for-anna", "household/look-for-soda", "kitting/gift-set"},
 }
 """Where planned trees are not yet as good as those by hand: what is to be mended in the planner."""
 

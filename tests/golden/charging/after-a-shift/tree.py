@@ -317,77 +317,55 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.docked(),
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(station) and unknown docked())",
-                    lambda: all_of(robot.at("station"), robot.docked() is None),
-                ),
-                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
+            Latch(
+                "check_charger()",
+                robot.check_charger,
+                robot.cancel,
+                guard=lambda: all_of(robot.at("station"), robot.docked() is None),
+                keep=False,
             ),
             sequence(
                 "sequence",
-                Condition(
-                    "(at(station) and known docked() and not docked() and patrol…",
-                    lambda: all_of(
-                        robot.at("station"),
-                        robot.docked() is not None,
-                        negated(robot.docked()),
-                        robot.patrolled("lobby"),
-                    ),
-                ),
-                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
+                Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
                 Latch(
-                    "return_to_dock(station)",
-                    lambda: robot.return_to_dock("station"),
+                    "scan(lobby)",
+                    lambda: robot.scan("lobby"),
                     robot.cancel,
+                    guard=lambda: robot.at("lobby"),
                     keep=False,
                 ),
-            ),
-            Latch(
-                "scan(lobby)",
-                lambda: robot.scan("lobby"),
-                robot.cancel,
-                guard=lambda: robot.at("lobby"),
-                keep=False,
-            ),
-            Latch(
-                "drive(lobby)",
-                lambda: robot.drive("lobby"),
-                robot.cancel,
-                guard=lambda: negated(robot.battery("low")),
-                keep=False,
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(known docked() and docked())",
-                    lambda: all_of(robot.docked() is not None, robot.docked()),
-                ),
-                Latch("charge()", robot.charge, robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(station) and known docked() and not docked())",
-                    lambda: all_of(
-                        robot.at("station"),
-                        robot.docked() is not None,
-                        negated(robot.docked()),
-                    ),
-                ),
-                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
             ),
             Latch(
                 "return_to_dock(station)",
                 lambda: robot.return_to_dock("station"),
                 robot.cancel,
+                guard=lambda: negated(robot.at("station")),
                 keep=False,
             ),
+            sequence(
+                "sequence",
+                Condition("not battery(half)", lambda: negated(robot.battery("half"))),
+                Latch(
+                    "dock(station)",
+                    lambda: robot.dock("station"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.at("station"), negated(robot.docked())),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
+                Latch(
+                    "drive(lobby)",
+                    lambda: robot.drive("lobby"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.battery("low")),
+                    keep=False,
+                ),
+            ),
+            Latch("charge()", robot.charge, robot.cancel, guard=robot.docked, keep=False),
+            Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
         ),
         READS,
     )
@@ -498,6 +476,7 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 READS: dict[Fact, bool] = {
     ("at", "lobby"): False,
     ("at", "station"): False,
+    ("battery", "half"): False,
     ("battery", "low"): False,
     ("docked",): True,
     ("patrolled", "lobby"): False,

@@ -317,9 +317,50 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.patrolled("workshop"),
                 ),
             ),
+            Latch(
+                "check_charger()",
+                robot.check_charger,
+                robot.cancel,
+                guard=lambda: all_of(robot.at("station"), robot.docked() is None),
+                keep=False,
+            ),
             sequence(
                 "sequence",
-                Condition("patrolled(store)", lambda: robot.patrolled("store")),
+                Condition(
+                    "(known docked() and docked() and not battery(full))",
+                    lambda: all_of(
+                        robot.docked() is not None,
+                        robot.docked(),
+                        negated(robot.battery("full")),
+                    ),
+                ),
+                Latch("charge()", robot.charge, robot.cancel, keep=False),
+            ),
+            sequence(
+                "sequence",
+                Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
+                Latch(
+                    "scan(lobby)",
+                    lambda: robot.scan("lobby"),
+                    robot.cancel,
+                    guard=lambda: robot.at("lobby"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not patrolled(store)", lambda: negated(robot.patrolled("store"))),
+                Latch(
+                    "scan(store)",
+                    lambda: robot.scan("store"),
+                    robot.cancel,
+                    guard=lambda: robot.at("store"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not patrolled(workshop)", lambda: negated(robot.patrolled("workshop"))),
                 Latch(
                     "scan(workshop)",
                     lambda: robot.scan("workshop"),
@@ -330,101 +371,29 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition(
-                    "(patrolled(lobby) and patrolled(store))",
-                    lambda: all_of(robot.patrolled("lobby"), robot.patrolled("store")),
-                ),
+                Condition("not battery(half)", lambda: negated(robot.battery("half"))),
                 Latch(
-                    "drive(workshop)",
-                    lambda: robot.drive("workshop"),
+                    "return_to_dock(station)",
+                    lambda: robot.return_to_dock("station"),
                     robot.cancel,
-                    guard=lambda: negated(robot.battery("low")),
+                    guard=lambda: negated(robot.at("station")),
                     keep=False,
                 ),
             ),
             sequence(
                 "sequence",
-                Condition(
-                    "(known docked() and docked() and patrolled(lobby))",
-                    lambda: all_of(
-                        robot.docked() is not None,
-                        robot.docked(),
-                        robot.patrolled("lobby"),
-                    ),
+                Condition("not battery(full)", lambda: negated(robot.battery("full"))),
+                Latch(
+                    "dock(station)",
+                    lambda: robot.dock("station"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.at("station"), negated(robot.docked())),
+                    keep=False,
                 ),
-                Latch("charge()", robot.charge, robot.cancel, keep=False),
             ),
             sequence(
                 "sequence",
-                Condition(
-                    "(at(station) and unknown docked() and patrolled(store))",
-                    lambda: all_of(
-                        robot.at("station"),
-                        robot.docked() is None,
-                        robot.patrolled("store"),
-                    ),
-                ),
-                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("patrolled(lobby)", lambda: robot.patrolled("lobby")),
-                fallback(
-                    "fallback",
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "(at(station) and known docked() and not docked() and patrol…",
-                            lambda: all_of(
-                                robot.at("station"),
-                                robot.docked() is not None,
-                                negated(robot.docked()),
-                                robot.patrolled("store"),
-                            ),
-                        ),
-                        Latch(
-                            "dock(station)",
-                            lambda: robot.dock("station"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    sequence(
-                        "sequence",
-                        Condition("patrolled(store)", lambda: robot.patrolled("store")),
-                        Latch(
-                            "return_to_dock(station)",
-                            lambda: robot.return_to_dock("station"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
-                        "scan(store)",
-                        lambda: robot.scan("store"),
-                        robot.cancel,
-                        guard=lambda: robot.at("store"),
-                        keep=False,
-                    ),
-                    Latch(
-                        "drive(store)",
-                        lambda: robot.drive("store"),
-                        robot.cancel,
-                        guard=lambda: negated(robot.battery("low")),
-                        keep=False,
-                    ),
-                ),
-            ),
-            Latch(
-                "scan(lobby)",
-                lambda: robot.scan("lobby"),
-                robot.cancel,
-                guard=lambda: robot.at("lobby"),
-                keep=False,
-            ),
-            sequence(
-                "sequence",
-                Condition("not battery(half)", lambda: negated(robot.battery("half"))),
+                Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
                 Latch(
                     "drive(lobby)",
                     lambda: robot.drive("lobby"),
@@ -435,31 +404,21 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition(
-                    "(known docked() and docked())",
-                    lambda: all_of(robot.docked() is not None, robot.docked()),
+                Condition("not patrolled(store)", lambda: negated(robot.patrolled("store"))),
+                Latch(
+                    "drive(store)",
+                    lambda: robot.drive("store"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.battery("low")),
+                    keep=False,
                 ),
-                Latch("charge()", robot.charge, robot.cancel, keep=False),
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(station) and unknown docked())",
-                    lambda: all_of(robot.at("station"), robot.docked() is None),
-                ),
-                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(station) and known docked() and not docked())",
-                    lambda: all_of(
-                        robot.at("station"),
-                        robot.docked() is not None,
-                        negated(robot.docked()),
-                    ),
-                ),
-                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
+            Latch(
+                "drive(workshop)",
+                lambda: robot.drive("workshop"),
+                robot.cancel,
+                guard=lambda: negated(robot.battery("low")),
+                keep=False,
             ),
         ),
         READS,
@@ -573,6 +532,7 @@ READS: dict[Fact, bool] = {
     ("at", "station"): False,
     ("at", "store"): False,
     ("at", "workshop"): False,
+    ("battery", "full"): False,
     ("battery", "half"): False,
     ("battery", "low"): False,
     ("docked",): True,

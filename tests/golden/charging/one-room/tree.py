@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -61,9 +61,6 @@ class Robot(Protocol):
 
     def drive(self, to: str) -> Status:
         """Start or continue drive(to)."""
-
-    def return_to_dock(self, dock: str) -> Status:
-        """Start or continue return_to_dock(dock)."""
 
     def scan(self, room: str) -> Status:
         """Start or continue scan(room)."""
@@ -185,11 +182,6 @@ class Latch(Decorator):
     def _end(self, status: Status) -> None:
         self._started = False
         self._final = status if self._keep else None
-
-
-def sequence(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children succeed. Every tick starts at the first child."""
-    return Sequence(name, memory=False, children=list(children))
 
 
 def fallback(name: str, *children: Behaviour) -> Behaviour:
@@ -324,38 +316,19 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: negated(robot.battery("low")),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(known docked() and docked())",
-                    lambda: all_of(robot.docked() is not None, robot.docked()),
-                ),
-                Latch("charge()", robot.charge, robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(station) and unknown docked())",
-                    lambda: all_of(robot.at("station"), robot.docked() is None),
-                ),
-                Latch("check_charger()", robot.check_charger, robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(station) and known docked() and not docked())",
-                    lambda: all_of(
-                        robot.at("station"),
-                        robot.docked() is not None,
-                        negated(robot.docked()),
-                    ),
-                ),
-                Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
-            ),
             Latch(
-                "return_to_dock(station)",
-                lambda: robot.return_to_dock("station"),
+                "check_charger()",
+                robot.check_charger,
                 robot.cancel,
+                guard=lambda: all_of(robot.at("station"), robot.docked() is None),
+                keep=False,
+            ),
+            Latch("charge()", robot.charge, robot.cancel, guard=robot.docked, keep=False),
+            Latch(
+                "dock(station)",
+                lambda: robot.dock("station"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("station"), negated(robot.docked())),
                 keep=False,
             ),
         ),
@@ -521,9 +494,6 @@ ACTIONS: dict[Fact, list[Factor]] = {
             ),
         ],
     ],
-    ("return_to_dock", "station"): [
-        [Outcome("19/20", {("at", "lobby"): False, ("at", "station"): True}), Outcome("1/20", {})],
-    ],
     ("scan", "lobby"): [[Outcome("9/10", {("patrolled", "lobby"): True}), Outcome("1/10", {})]],
 }
 """What each action does: independent choices between outcomes."""
@@ -555,9 +525,6 @@ class SimulatedWorld(World):
 
     def drive(self, to: str) -> Status:
         return self._act("drive", to)
-
-    def return_to_dock(self, dock: str) -> Status:
-        return self._act("return_to_dock", dock)
 
     def scan(self, room: str) -> Status:
         return self._act("scan", room)

@@ -50,6 +50,9 @@ class Robot(Protocol):
     def present(self, person: str) -> bool | None:
         """Whether present(person) holds; None where that is unknown."""
 
+    def staffed(self, room: str) -> bool | None:
+        """Whether staffed(room) holds."""
+
     def voicemail(self, person: str) -> bool | None:
         """Whether voicemail(person) holds."""
 
@@ -307,50 +310,48 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("handed(vase,ben)", lambda: robot.handed("vase", "ben")),
+            Latch(
+                "knock(ben,desk7)",
+                lambda: robot.knock("ben", "desk7"),
+                robot.cancel,
+                guard=lambda: all_of(robot.present("ben") is None, robot.at("desk7")),
+                keep=False,
+            ),
+            Latch(
+                "hand_over(vase,ben,desk7)",
+                lambda: robot.hand_over("vase", "ben", "desk7"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.carrying("vase"),
+                    robot.at("desk7"),
+                    robot.present("ben"),
+                ),
+                keep=False,
+            ),
             sequence(
                 "sequence",
                 Condition("not at(desk7)", lambda: negated(robot.at("desk7"))),
                 Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),
-            sequence(
-                "sequence",
-                Condition("known present(ben)", lambda: robot.present("ben") is not None),
-                Condition("present(ben)", lambda: robot.present("ben")),
-                Latch(
-                    "hand_over(vase,ben,desk7)",
-                    lambda: robot.hand_over("vase", "ben", "desk7"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.carrying("vase"),
-                        robot.at("desk7"),
-                        robot.present("ben"),
-                    ),
-                    keep=False,
+            Latch(
+                "phone(ben)",
+                lambda: robot.phone("ben"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    negated(robot.present("ben")),
+                    negated(robot.voicemail("ben")),
                 ),
+                keep=False,
             ),
             sequence(
                 "sequence",
-                Condition("unknown present(ben)", lambda: robot.present("ben") is None),
-                Latch(
-                    "knock(ben,desk7)",
-                    lambda: robot.knock("ben", "desk7"),
-                    robot.cancel,
-                    keep=False,
-                ),
+                Condition("not carrying(vase)", lambda: negated(robot.carrying("vase"))),
+                Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),
             sequence(
                 "sequence",
-                Condition("not voicemail(ben)", lambda: negated(robot.voicemail("ben"))),
-                Latch(
-                    "phone(ben)",
-                    lambda: robot.phone("ben"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.present("ben")),
-                        negated(robot.voicemail("ben")),
-                    ),
-                    keep=False,
-                ),
+                Condition("staffed(reception)", lambda: robot.staffed("reception")),
+                Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),
         ),
         READS,
@@ -464,6 +465,7 @@ READS: dict[Fact, bool] = {
     ("carrying", "vase"): False,
     ("handed", "vase", "ben"): False,
     ("present", "ben"): True,
+    ("staffed", "reception"): False,
     ("voicemail", "ben"): False,
 }
 """The facts that the tree reads, and whether they can be unknown."""
@@ -478,6 +480,7 @@ INITIAL: list[tuple[str, State]] = [
             ("carrying", "vase"): True,
             ("handed", "vase", "ben"): False,
             ("present", "ben"): None,
+            ("staffed", "reception"): False,
             ("voicemail", "ben"): False,
         },
     ),
@@ -522,6 +525,9 @@ class SimulatedWorld(World):
 
     def present(self, person: str) -> bool | None:
         return self._value("present", person)
+
+    def staffed(self, room: str) -> bool | None:
+        return self._value("staffed", room)
 
     def voicemail(self, person: str) -> bool | None:
         return self._value("voicemail", person)

@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -63,6 +63,13 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
 
 
 def any_of(*values: bool | None) -> bool | None:
@@ -168,11 +175,6 @@ class Latch(Decorator):
     def _end(self, status: Status) -> None:
         self._started = False
         self._final = status if self._keep else None
-
-
-def sequence(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children succeed. Every tick starts at the first child."""
-    return Sequence(name, memory=False, children=list(children))
 
 
 def fallback(name: str, *children: Behaviour) -> Behaviour:
@@ -296,26 +298,14 @@ def create_root(robot: Robot) -> Behaviour:
                 "(handed(invoice,anna) or left(invoice,reception))",
                 lambda: any_of(robot.handed("invoice", "anna"), robot.left("invoice", "reception")),
             ),
-            sequence(
-                "sequence for (handed(invoice,anna) or left(invoice,reception))",
-                Condition("carrying(invoice)", lambda: robot.carrying("invoice")),
-                fallback(
-                    "fallback",
-                    Condition("at(reception)", lambda: robot.at("reception")),
-                    Latch(
-                        "go_to(reception)",
-                        lambda: robot.go_to("reception"),
-                        robot.cancel,
-                        keep=False,
-                    ),
-                ),
-                Latch(
-                    "leave(invoice,reception)",
-                    lambda: robot.leave("invoice", "reception"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "leave(invoice,reception)",
+                lambda: robot.leave("invoice", "reception"),
+                robot.cancel,
+                guard=lambda: all_of(robot.carrying("invoice"), robot.at("reception")),
+                keep=False,
             ),
+            Latch("go_to(reception)", lambda: robot.go_to("reception"), robot.cancel, keep=False),
         ),
         READS,
     )

@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -52,6 +52,9 @@ class Robot(Protocol):
 
     def go_through(self, door: str, arg_from: str, to: str) -> Status:
         """Start or continue go_through(door, arg_from, to)."""
+
+    def take_key(self, key: str, room: str) -> Status:
+        """Start or continue take_key(key, room)."""
 
     def try_handle(self, door: str, arg_from: str) -> Status:
         """Start or continue try_handle(door, arg_from)."""
@@ -168,11 +171,6 @@ class Latch(Decorator):
     def _end(self, status: Status) -> None:
         self._started = False
         self._final = status if self._keep else None
-
-
-def sequence(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children succeed. Every tick starts at the first child."""
-    return Sequence(name, memory=False, children=list(children))
 
 
 def fallback(name: str, *children: Behaviour) -> Behaviour:
@@ -294,24 +292,18 @@ def create_root(robot: Robot) -> Behaviour:
             "fallback",
             Condition("in(lab)", lambda: robot.is_in("lab")),
             Latch(
+                "call_control_room(lab_door)",
+                lambda: robot.call_control_room("lab_door"),
+                robot.cancel,
+                guard=lambda: robot.locked("lab_door"),
+                keep=False,
+            ),
+            Latch(
                 "go_through(lab_door,hall,lab)",
                 lambda: robot.go_through("lab_door", "hall", "lab"),
                 robot.cancel,
                 guard=lambda: all_of(robot.is_in("hall"), robot.open("lab_door")),
                 keep=False,
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(known locked(lab_door) and locked(lab_door))",
-                    lambda: all_of(robot.locked("lab_door") is not None, robot.locked("lab_door")),
-                ),
-                Latch(
-                    "call_control_room(lab_door)",
-                    lambda: robot.call_control_room("lab_door"),
-                    robot.cancel,
-                    keep=False,
-                ),
             ),
             Latch(
                 "go_through(office_door,office,hall)",
@@ -320,34 +312,33 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: all_of(robot.is_in("office"), robot.open("office_door")),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(unknown locked(office_door) and in(office))",
-                    lambda: all_of(robot.locked("office_door") is None, robot.is_in("office")),
-                ),
-                Latch(
-                    "try_handle(office_door,office)",
-                    lambda: robot.try_handle("office_door", "office"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "try_handle(office_door,office)",
+                lambda: robot.try_handle("office_door", "office"),
+                robot.cancel,
+                guard=lambda: all_of(robot.locked("office_door") is None, robot.is_in("office")),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(known locked(office_door) and locked(office_door))",
-                    lambda: all_of(
-                        robot.locked("office_door") is not None,
-                        robot.locked("office_door"),
-                    ),
-                ),
-                Latch(
-                    "call_control_room(office_door)",
-                    lambda: robot.call_control_room("office_door"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "call_control_room(office_door)",
+                lambda: robot.call_control_room("office_door"),
+                robot.cancel,
+                guard=lambda: robot.locked("office_door"),
+                keep=False,
+            ),
+            Latch(
+                "take_key(lab_key,office)",
+                lambda: robot.take_key("lab_key", "office"),
+                robot.cancel,
+                guard=lambda: robot.is_in("office"),
+                keep=False,
+            ),
+            Latch(
+                "go_through(office_door,hall,office)",
+                lambda: robot.go_through("office_door", "hall", "office"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("hall"), robot.open("office_door")),
+                keep=False,
             ),
         ),
         READS,
@@ -472,6 +463,7 @@ INITIAL: list[tuple[str, State]] = [
     (
         "1",
         {
+            ("holding", "lab_key"): False,
             ("in", "hall"): True,
             ("in", "lab"): False,
             ("in", "office"): False,
@@ -501,8 +493,14 @@ ACTIONS: dict[Fact, list[Factor]] = {
     ("go_through", "lab_door", "hall", "lab"): [
         [Outcome("1", {("in", "hall"): False, ("in", "lab"): True})],
     ],
+    ("go_through", "office_door", "hall", "office"): [
+        [Outcome("1", {("in", "hall"): False, ("in", "office"): True})],
+    ],
     ("go_through", "office_door", "office", "hall"): [
         [Outcome("1", {("in", "hall"): True, ("in", "office"): False})],
+    ],
+    ("take_key", "lab_key", "office"): [
+        [Outcome("19/20", {("holding", "lab_key"): True}), Outcome("1/20", {})],
     ],
     ("try_handle", "office_door", "office"): [
         [
@@ -531,6 +529,9 @@ class SimulatedWorld(World):
 
     def go_through(self, door: str, arg_from: str, to: str) -> Status:
         return self._act("go_through", door, arg_from, to)
+
+    def take_key(self, key: str, room: str) -> Status:
+        return self._act("take_key", key, room)
 
     def try_handle(self, door: str, arg_from: str) -> Status:
         return self._act("try_handle", door, arg_from)

@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -76,11 +76,6 @@ def all_of(*values: bool | None) -> bool | None:
     if False in values:
         return False
     return None if None in values else True
-
-
-def negated(value: bool | None) -> bool | None:
-    """Three-valued "not": unknown stays unknown."""
-    return None if value is None else not value
 
 
 class Condition(Behaviour):
@@ -179,11 +174,6 @@ class Latch(Decorator):
     def _end(self, status: Status) -> None:
         self._started = False
         self._final = status if self._keep else None
-
-
-def sequence(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children succeed. Every tick starts at the first child."""
-    return Sequence(name, memory=False, children=list(children))
 
 
 def fallback(name: str, *children: Behaviour) -> Behaviour:
@@ -304,51 +294,19 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("in(archive)", lambda: robot.is_in("archive")),
-            sequence(
-                "sequence",
-                Condition(
-                    "known locked(archive_door)",
-                    lambda: robot.locked("archive_door") is not None,
-                ),
-                Condition(
-                    "not locked(archive_door)",
-                    lambda: negated(robot.locked("archive_door")),
-                ),
-                Latch(
-                    "go_through(archive_door,hall,archive)",
-                    lambda: robot.go_through("archive_door", "hall", "archive"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.is_in("hall"), robot.open("archive_door")),
-                    keep=False,
-                ),
+            Latch(
+                "go_through(archive_door,hall,archive)",
+                lambda: robot.go_through("archive_door", "hall", "archive"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("hall"), robot.open("archive_door")),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "unknown locked(archive_door)",
-                    lambda: robot.locked("archive_door") is None,
-                ),
-                Latch(
-                    "try_handle(archive_door,hall)",
-                    lambda: robot.try_handle("archive_door", "hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.locked("archive_door") is None, robot.is_in("hall")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "not holding(archive_key)",
-                    lambda: negated(robot.holding("archive_key")),
-                ),
-                Latch(
-                    "take_key(archive_key,hall)",
-                    lambda: robot.take_key("archive_key", "hall"),
-                    robot.cancel,
-                    guard=lambda: robot.is_in("hall"),
-                    keep=False,
-                ),
+            Latch(
+                "try_handle(archive_door,hall)",
+                lambda: robot.try_handle("archive_door", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.locked("archive_door") is None, robot.is_in("hall")),
+                keep=False,
             ),
             Latch(
                 "unlock(archive_door,archive_key,hall)",
@@ -359,6 +317,13 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.holding("archive_key"),
                     robot.is_in("hall"),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "take_key(archive_key,hall)",
+                lambda: robot.take_key("archive_key", "hall"),
+                robot.cancel,
+                guard=lambda: robot.is_in("hall"),
                 keep=False,
             ),
         ),

@@ -300,18 +300,26 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: all_of(robot.is_in("corridor"), robot.open("lab_door")),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(unknown locked(lab_door) and in(corridor))",
-                    lambda: all_of(robot.locked("lab_door") is None, robot.is_in("corridor")),
-                ),
-                Latch(
-                    "try_handle(lab_door,corridor)",
-                    lambda: robot.try_handle("lab_door", "corridor"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "go_through(corridor_door,hall,corridor)",
+                lambda: robot.go_through("corridor_door", "hall", "corridor"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("hall"), robot.open("corridor_door")),
+                keep=False,
+            ),
+            Latch(
+                "try_handle(lab_door,corridor)",
+                lambda: robot.try_handle("lab_door", "corridor"),
+                robot.cancel,
+                guard=lambda: all_of(robot.locked("lab_door") is None, robot.is_in("corridor")),
+                keep=False,
+            ),
+            Latch(
+                "try_handle(corridor_door,hall)",
+                lambda: robot.try_handle("corridor_door", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.locked("corridor_door") is None, robot.is_in("hall")),
+                keep=False,
             ),
             sequence(
                 "sequence",
@@ -327,40 +335,25 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             Latch(
-                "go_through(corridor_door,hall,corridor)",
-                lambda: robot.go_through("corridor_door", "hall", "corridor"),
+                "call_control_room(corridor_door)",
+                lambda: robot.call_control_room("corridor_door"),
                 robot.cancel,
-                guard=lambda: all_of(robot.is_in("hall"), robot.open("corridor_door")),
+                guard=lambda: robot.locked("corridor_door"),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(unknown locked(corridor_door) and in(hall))",
-                    lambda: all_of(robot.locked("corridor_door") is None, robot.is_in("hall")),
-                ),
-                Latch(
-                    "try_handle(corridor_door,hall)",
-                    lambda: robot.try_handle("corridor_door", "hall"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "call_control_room(lab_door)",
+                lambda: robot.call_control_room("lab_door"),
+                robot.cancel,
+                guard=lambda: robot.locked("lab_door"),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(known locked(corridor_door) and locked(corridor_door))",
-                    lambda: all_of(
-                        robot.locked("corridor_door") is not None,
-                        robot.locked("corridor_door"),
-                    ),
-                ),
-                Latch(
-                    "call_control_room(corridor_door)",
-                    lambda: robot.call_control_room("corridor_door"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "go_through(corridor_door,corridor,hall)",
+                lambda: robot.go_through("corridor_door", "corridor", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.is_in("corridor"), robot.open("corridor_door")),
+                keep=False,
             ),
         ),
         READS,
@@ -510,6 +503,9 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("1/3", {("locked", "lab_door"): False, ("open", "lab_door"): True}),
             Outcome("2/3", {}),
         ],
+    ],
+    ("go_through", "corridor_door", "corridor", "hall"): [
+        [Outcome("1", {("in", "corridor"): False, ("in", "hall"): True})],
     ],
     ("go_through", "corridor_door", "hall", "corridor"): [
         [Outcome("1", {("in", "corridor"): True, ("in", "hall"): False})],

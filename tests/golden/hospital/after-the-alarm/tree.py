@@ -350,79 +350,169 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("given(insulin)", lambda: robot.given("insulin")),
-            sequence(
-                "sequence",
-                Condition("not lift_works()", lambda: negated(robot.lift_works())),
-                Condition("lies_in(insulin,hall)", lambda: robot.lies_in("insulin", "hall")),
-                Latch("report_lift()", robot.report_lift, robot.cancel, keep=False),
+            Latch(
+                "report_lift()",
+                robot.report_lift,
+                robot.cancel,
+                guard=lambda: negated(robot.lift_works()),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("battery_low()", robot.battery_low),
-                Condition("at(landing)", lambda: robot.at("landing")),
-                Condition("not on_tray(insulin)", lambda: negated(robot.on_tray("insulin"))),
-                Latch("charge(landing)", lambda: robot.charge("landing"), robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(children)", lambda: robot.at("children")),
-                Condition("known present(olga)", lambda: robot.present("olga") is not None),
-                Condition("not present(olga)", lambda: negated(robot.present("olga"))),
-                Latch(
-                    "page(olga,children)",
-                    lambda: robot.page("olga", "children"),
-                    robot.cancel,
-                    keep=False,
+            Latch(
+                "call_lift(hall)",
+                lambda: robot.call_lift("hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    robot.lift_works(),
+                    negated(robot.lift_at("hall")),
                 ),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("unknown present(olga)", lambda: robot.present("olga") is None),
-                Condition("at(children)", lambda: robot.at("children")),
-                Latch(
-                    "look_for(olga,children)",
-                    lambda: robot.look_for("olga", "children"),
-                    robot.cancel,
-                    keep=False,
+            Latch(
+                "call_lift(landing)",
+                lambda: robot.call_lift("landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    robot.lift_works(),
+                    negated(robot.lift_at("landing")),
                 ),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("at(children)", lambda: robot.at("children")),
-                Condition("on_tray(insulin)", lambda: robot.on_tray("insulin")),
-                Latch(
-                    "hand_over(insulin,olga,children)",
-                    lambda: robot.hand_over("insulin", "olga", "children"),
-                    robot.cancel,
-                    keep=False,
+            Latch(
+                "look_for(olga,children)",
+                lambda: robot.look_for("olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), robot.present("olga") is None),
+                keep=False,
+            ),
+            Latch(
+                "page(olga,children)",
+                lambda: robot.page("olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), negated(robot.present("olga"))),
+                keep=False,
+            ),
+            Latch(
+                "charge(hall)",
+                lambda: robot.charge("hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
+                keep=False,
+            ),
+            Latch(
+                "charge(landing)",
+                lambda: robot.charge("landing"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("landing"), robot.battery_low()),
+                keep=False,
+            ),
+            Latch(
+                "hand_over(insulin,olga,children)",
+                lambda: robot.hand_over("insulin", "olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.on_tray("insulin"),
+                    robot.present("olga"),
                 ),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("bolted(children_door)", lambda: robot.bolted("children_door")),
-                Condition("at(landing)", lambda: robot.at("landing")),
-                Condition("not open(children_door)", lambda: negated(robot.open("children_door"))),
-                Latch(
-                    "ring(children_door,landing)",
-                    lambda: robot.ring("children_door", "landing"),
-                    robot.cancel,
-                    keep=False,
+            Latch(
+                "pick_up(insulin,hall)",
+                lambda: robot.pick_up("insulin", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    robot.lies_in("insulin", "hall"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.battery_low()),
                 ),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("not open(children_door)", lambda: negated(robot.open("children_door"))),
-                Condition("at(landing)", lambda: robot.at("landing")),
-                Latch(
-                    "push(children_door,landing)",
-                    lambda: robot.push("children_door", "landing"),
-                    robot.cancel,
-                    keep=False,
+            Latch(
+                "ride(hall,landing)",
+                lambda: robot.ride("hall", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    robot.lift_at("hall"),
+                    robot.lift_works(),
+                    negated(robot.battery_low()),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "push(children_door,landing)",
+                lambda: robot.push("children_door", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    negated(robot.open("children_door")),
+                    any_of(
+                        negated(robot.bolted("children_door")),
+                        robot.bolted("children_door") is None,
+                    ),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "ring(children_door,landing)",
+                lambda: robot.ring("children_door", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    negated(robot.open("children_door")),
+                    robot.bolted("children_door"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "pick_up(insulin,children)",
+                lambda: robot.pick_up("insulin", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.lies_in("insulin", "children"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.battery_low()),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(children_door,children,landing)",
+                lambda: robot.drive("children_door", "children", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), robot.open("children_door")),
+                keep=False,
+            ),
+            Latch(
+                "push(children_door,children)",
+                lambda: robot.push("children_door", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    negated(robot.open("children_door")),
+                    any_of(
+                        negated(robot.bolted("children_door")),
+                        robot.bolted("children_door") is None,
+                    ),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "ring(children_door,children)",
+                lambda: robot.ring("children_door", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    negated(robot.open("children_door")),
+                    robot.bolted("children_door"),
+                ),
+                keep=False,
             ),
             sequence(
                 "sequence",
-                Condition("at(landing)", lambda: robot.at("landing")),
                 Condition(
                     "not lies_in(insulin,hall)",
                     lambda: negated(robot.lies_in("insulin", "hall")),
@@ -431,147 +521,20 @@ def create_root(robot: Robot) -> Behaviour:
                     "drive(children_door,landing,children)",
                     lambda: robot.drive("children_door", "landing", "children"),
                     robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "lies_in(insulin,children)",
-                    lambda: robot.lies_in("insulin", "children"),
-                ),
-                Condition("not battery_low()", lambda: negated(robot.battery_low())),
-                Latch(
-                    "pick_up(insulin,children)",
-                    lambda: robot.pick_up("insulin", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("children"),
-                        robot.lies_in("insulin", "children"),
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(landing)", lambda: robot.at("landing")),
-                fallback(
-                    "fallback",
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "not lift_at(landing)",
-                            lambda: negated(robot.lift_at("landing")),
-                        ),
-                        Latch(
-                            "call_lift(landing)",
-                            lambda: robot.call_lift("landing"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
-                        "ride(landing,hall)",
-                        lambda: robot.ride("landing", "hall"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            robot.at("landing"),
-                            robot.lift_at("landing"),
-                            robot.lift_works(),
-                            negated(robot.battery_low()),
-                        ),
-                        keep=False,
-                    ),
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("lies_in(insulin,hall)", lambda: robot.lies_in("insulin", "hall")),
-                Condition("not battery_low()", lambda: negated(robot.battery_low())),
-                Latch(
-                    "pick_up(insulin,hall)",
-                    lambda: robot.pick_up("insulin", "hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("hall"),
-                        robot.lies_in("insulin", "hall"),
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("not lift_works()", lambda: negated(robot.lift_works())),
-                Condition("not at(children)", lambda: negated(robot.at("children"))),
-                Latch("report_lift()", robot.report_lift, robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("not battery_low()", lambda: negated(robot.battery_low())),
-                Latch(
-                    "ride(hall,landing)",
-                    lambda: robot.ride("hall", "landing"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("hall"),
-                        robot.lift_at("hall"),
-                        robot.lift_works(),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("open(children_door)", lambda: robot.open("children_door")),
-                Latch(
-                    "drive(children_door,children,landing)",
-                    lambda: robot.drive("children_door", "children", "landing"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("children"), robot.open("children_door")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "not bolted(children_door)",
-                    lambda: negated(robot.bolted("children_door")),
-                ),
-                Latch(
-                    "push(children_door,children)",
-                    lambda: robot.push("children_door", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("children"),
-                        negated(robot.open("children_door")),
-                        any_of(
-                            negated(robot.bolted("children_door")),
-                            robot.bolted("children_door") is None,
-                        ),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(children)", lambda: robot.at("children")),
-                Latch(
-                    "ring(children_door,children)",
-                    lambda: robot.ring("children_door", "children"),
-                    robot.cancel,
+                    guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
                     keep=False,
                 ),
             ),
             Latch(
-                "charge(hall)",
-                lambda: robot.charge("hall"),
+                "ride(landing,hall)",
+                lambda: robot.ride("landing", "hall"),
                 robot.cancel,
-                guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    robot.lift_at("landing"),
+                    robot.lift_works(),
+                    negated(robot.battery_low()),
+                ),
                 keep=False,
             ),
         ),
@@ -725,6 +688,13 @@ INITIAL: list[tuple[str, State]] = [
 
 
 ACTIONS: dict[Fact, list[Factor]] = {
+    ("call_lift", "hall"): [
+        [
+            Outcome("9/10", {("lift_at", "hall"): True, ("lift_at", "landing"): False}),
+            Outcome("1/20", {("lift_works",): False}),
+            Outcome("1/20", {}),
+        ],
+    ],
     ("call_lift", "landing"): [
         [
             Outcome("9/10", {("lift_at", "hall"): False, ("lift_at", "landing"): True}),

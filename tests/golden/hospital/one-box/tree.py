@@ -350,95 +350,151 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("given(insulin)", lambda: robot.given("insulin")),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(children) and on_tray(insulin) and known present(olga) …",
-                    lambda: all_of(
-                        robot.at("children"),
-                        robot.on_tray("insulin"),
-                        robot.present("olga") is not None,
-                        robot.present("olga"),
+            Latch(
+                "report_lift()",
+                robot.report_lift,
+                robot.cancel,
+                guard=lambda: negated(robot.lift_works()),
+                keep=False,
+            ),
+            Latch(
+                "charge(hall)",
+                lambda: robot.charge("hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
+                keep=False,
+            ),
+            Latch(
+                "charge(landing)",
+                lambda: robot.charge("landing"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("landing"), robot.battery_low()),
+                keep=False,
+            ),
+            Latch(
+                "push(pharmacy_door,pharmacy)",
+                lambda: robot.push("pharmacy_door", "pharmacy"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("pharmacy"),
+                    negated(robot.open("pharmacy_door")),
+                    any_of(
+                        negated(robot.bolted("pharmacy_door")),
+                        robot.bolted("pharmacy_door") is None,
                     ),
                 ),
-                Latch(
-                    "hand_over(insulin,olga,children)",
-                    lambda: robot.hand_over("insulin", "olga", "children"),
-                    robot.cancel,
-                    keep=False,
-                ),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(children) and unknown present(olga))",
-                    lambda: all_of(robot.at("children"), robot.present("olga") is None),
-                ),
-                Latch(
-                    "look_for(olga,children)",
-                    lambda: robot.look_for("olga", "children"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "look_for(olga,children)",
+                lambda: robot.look_for("olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), robot.present("olga") is None),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(known present(olga) and present(olga))",
-                    lambda: all_of(robot.present("olga") is not None, robot.present("olga")),
-                ),
-                Latch(
-                    "pick_up(insulin,children)",
-                    lambda: robot.pick_up("insulin", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("children"),
-                        robot.lies_in("insulin", "children"),
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
+            Latch(
+                "page(olga,children)",
+                lambda: robot.page("olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), negated(robot.present("olga"))),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(children) and known present(olga) and not present(olga))",
-                    lambda: all_of(
-                        robot.at("children"),
-                        robot.present("olga") is not None,
-                        negated(robot.present("olga")),
+            Latch(
+                "push(children_door,landing)",
+                lambda: robot.push("children_door", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    negated(robot.open("children_door")),
+                    any_of(
+                        negated(robot.bolted("children_door")),
+                        robot.bolted("children_door") is None,
                     ),
                 ),
-                Latch(
-                    "page(olga,children)",
-                    lambda: robot.page("olga", "children"),
-                    robot.cancel,
-                    keep=False,
+                keep=False,
+            ),
+            Latch(
+                "ring(pharmacy_door,pharmacy)",
+                lambda: robot.ring("pharmacy_door", "pharmacy"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("pharmacy"),
+                    negated(robot.open("pharmacy_door")),
+                    robot.bolted("pharmacy_door"),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "call_lift(hall)",
+                lambda: robot.call_lift("hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    robot.lift_works(),
+                    negated(robot.lift_at("hall")),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "hand_over(insulin,olga,children)",
+                lambda: robot.hand_over("insulin", "olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.on_tray("insulin"),
+                    robot.present("olga"),
+                ),
+                keep=False,
             ),
             sequence(
                 "sequence",
                 Condition(
-                    "(on_tray(insulin) or (not battery_low() and lies_in(insulin…",
-                    lambda: any_of(
-                        robot.on_tray("insulin"),
-                        all_of(negated(robot.battery_low()), robot.lies_in("insulin", "children")),
-                    ),
+                    "not lies_in(insulin,pharmacy)",
+                    lambda: negated(robot.lies_in("insulin", "pharmacy")),
                 ),
                 Latch(
-                    "drive(children_door,landing,children)",
-                    lambda: robot.drive("children_door", "landing", "children"),
+                    "drive(pharmacy_door,pharmacy,hall)",
+                    lambda: robot.drive("pharmacy_door", "pharmacy", "hall"),
                     robot.cancel,
-                    guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
+                    guard=lambda: all_of(robot.at("pharmacy"), robot.open("pharmacy_door")),
                     keep=False,
                 ),
+            ),
+            Latch(
+                "pick_up(insulin,pharmacy)",
+                lambda: robot.pick_up("insulin", "pharmacy"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("pharmacy"),
+                    robot.lies_in("insulin", "pharmacy"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.battery_low()),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(pharmacy_door,pharmacy,hall)",
+                lambda: robot.drive("pharmacy_door", "pharmacy", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("pharmacy"), robot.open("pharmacy_door")),
+                keep=False,
+            ),
+            Latch(
+                "call_lift(landing)",
+                lambda: robot.call_lift("landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    robot.lift_works(),
+                    negated(robot.lift_at("landing")),
+                ),
+                keep=False,
             ),
             sequence(
                 "sequence",
                 Condition(
-                    "(on_tray(insulin) or lies_in(insulin,children))",
-                    lambda: any_of(robot.on_tray("insulin"), robot.lies_in("insulin", "children")),
+                    "not lies_in(insulin,pharmacy)",
+                    lambda: negated(robot.lies_in("insulin", "pharmacy")),
                 ),
                 Latch(
                     "ride(hall,landing)",
@@ -453,114 +509,16 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(landing) and not open(children_door) and ((known bolted…",
-                    lambda: all_of(
-                        robot.at("landing"),
-                        negated(robot.open("children_door")),
-                        any_of(
-                            all_of(
-                                robot.bolted("children_door") is not None,
-                                negated(robot.bolted("children_door")),
-                            ),
-                            robot.bolted("children_door") is None,
-                        ),
-                        any_of(
-                            robot.on_tray("insulin"),
-                            robot.lies_in("insulin", "children"),
-                            all_of(
-                                negated(robot.battery_low()),
-                                robot.lift_at("landing"),
-                                robot.present("olga") is not None,
-                                robot.present("olga"),
-                            ),
-                            all_of(
-                                negated(robot.battery_low()),
-                                negated(robot.lift_works()),
-                                robot.present("olga") is not None,
-                                robot.present("olga"),
-                            ),
-                        ),
-                    ),
-                ),
-                Latch(
-                    "push(children_door,landing)",
-                    lambda: robot.push("children_door", "landing"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(landing) and not open(children_door) and known bolted(c…",
-                    lambda: all_of(
-                        robot.at("landing"),
-                        negated(robot.open("children_door")),
-                        robot.bolted("children_door") is not None,
-                        robot.bolted("children_door"),
-                    ),
-                ),
-                Latch(
-                    "ring(children_door,landing)",
-                    lambda: robot.ring("children_door", "landing"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(open(children_door) or lift_at(landing))",
-                    lambda: any_of(robot.open("children_door"), robot.lift_at("landing")),
-                ),
-                Latch(
-                    "charge(landing)",
-                    lambda: robot.charge("landing"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("landing"), robot.battery_low()),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(on_tray(insulin) or battery_low())",
-                    lambda: any_of(robot.on_tray("insulin"), robot.battery_low()),
-                ),
-                Latch(
-                    "drive(pharmacy_door,pharmacy,hall)",
-                    lambda: robot.drive("pharmacy_door", "pharmacy", "hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("pharmacy"), robot.open("pharmacy_door")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(on_tray(insulin) or open(pharmacy_door) or unknown bolted(…",
-                    lambda: any_of(
-                        robot.on_tray("insulin"),
-                        robot.open("pharmacy_door"),
-                        robot.bolted("pharmacy_door") is None,
-                    ),
-                ),
-                Latch(
-                    "charge(hall)",
-                    lambda: robot.charge("hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
-                    keep=False,
-                ),
-            ),
             Latch(
-                "report_lift()",
-                robot.report_lift,
+                "pick_up(insulin,children)",
+                lambda: robot.pick_up("insulin", "children"),
                 robot.cancel,
-                guard=lambda: negated(robot.lift_works()),
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.lies_in("insulin", "children"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.battery_low()),
+                ),
                 keep=False,
             ),
             Latch(
@@ -570,44 +528,30 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: all_of(robot.at("children"), robot.open("children_door")),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("open(pharmacy_door)", lambda: robot.open("pharmacy_door")),
-                Latch(
-                    "pick_up(insulin,pharmacy)",
-                    lambda: robot.pick_up("insulin", "pharmacy"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("pharmacy"),
-                        robot.lies_in("insulin", "pharmacy"),
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.battery_low()),
+            Latch(
+                "push(children_door,children)",
+                lambda: robot.push("children_door", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    negated(robot.open("children_door")),
+                    any_of(
+                        negated(robot.bolted("children_door")),
+                        robot.bolted("children_door") is None,
                     ),
-                    keep=False,
                 ),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(children) and not open(children_door) and ((known bolte…",
-                    lambda: all_of(
-                        robot.at("children"),
-                        negated(robot.open("children_door")),
-                        any_of(
-                            all_of(
-                                robot.bolted("children_door") is not None,
-                                negated(robot.bolted("children_door")),
-                            ),
-                            robot.bolted("children_door") is None,
-                        ),
-                    ),
+            Latch(
+                "ring(children_door,landing)",
+                lambda: robot.ring("children_door", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    negated(robot.open("children_door")),
+                    robot.bolted("children_door"),
                 ),
-                Latch(
-                    "push(children_door,children)",
-                    lambda: robot.push("children_door", "children"),
-                    robot.cancel,
-                    keep=False,
-                ),
+                keep=False,
             ),
             Latch(
                 "drive(pharmacy_door,hall,pharmacy)",
@@ -616,90 +560,31 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: all_of(robot.at("hall"), robot.open("pharmacy_door")),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(pharmacy) and not open(pharmacy_door) and ((known bolte…",
-                    lambda: all_of(
-                        robot.at("pharmacy"),
-                        negated(robot.open("pharmacy_door")),
-                        any_of(
-                            all_of(
-                                robot.bolted("pharmacy_door") is not None,
-                                negated(robot.bolted("pharmacy_door")),
-                            ),
-                            robot.bolted("pharmacy_door") is None,
-                        ),
+            Latch(
+                "push(pharmacy_door,hall)",
+                lambda: robot.push("pharmacy_door", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    negated(robot.open("pharmacy_door")),
+                    any_of(
+                        negated(robot.bolted("pharmacy_door")),
+                        robot.bolted("pharmacy_door") is None,
                     ),
                 ),
-                Latch(
-                    "push(pharmacy_door,pharmacy)",
-                    lambda: robot.push("pharmacy_door", "pharmacy"),
-                    robot.cancel,
-                    keep=False,
-                ),
+                keep=False,
             ),
             sequence(
                 "sequence",
                 Condition(
-                    "(at(children) and not open(children_door) and known bolted(…",
-                    lambda: all_of(
-                        robot.at("children"),
-                        negated(robot.open("children_door")),
-                        robot.bolted("children_door") is not None,
-                        robot.bolted("children_door"),
-                    ),
+                    "not lies_in(insulin,pharmacy)",
+                    lambda: negated(robot.lies_in("insulin", "pharmacy")),
                 ),
                 Latch(
-                    "ring(children_door,children)",
-                    lambda: robot.ring("children_door", "children"),
+                    "drive(children_door,landing,children)",
+                    lambda: robot.drive("children_door", "landing", "children"),
                     robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(hall) and not open(pharmacy_door) and ((known bolted(ph…",
-                    lambda: all_of(
-                        robot.at("hall"),
-                        negated(robot.open("pharmacy_door")),
-                        any_of(
-                            all_of(
-                                robot.bolted("pharmacy_door") is not None,
-                                negated(robot.bolted("pharmacy_door")),
-                            ),
-                            robot.bolted("pharmacy_door") is None,
-                        ),
-                        any_of(
-                            all_of(robot.present("olga") is not None, robot.present("olga")),
-                            robot.open("children_door"),
-                            robot.lift_at("hall"),
-                        ),
-                    ),
-                ),
-                Latch(
-                    "push(pharmacy_door,hall)",
-                    lambda: robot.push("pharmacy_door", "hall"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(hall) and not open(pharmacy_door) and known bolted(phar…",
-                    lambda: all_of(
-                        robot.at("hall"),
-                        negated(robot.open("pharmacy_door")),
-                        robot.bolted("pharmacy_door") is not None,
-                        robot.bolted("pharmacy_door"),
-                    ),
-                ),
-                Latch(
-                    "ring(pharmacy_door,hall)",
-                    lambda: robot.ring("pharmacy_door", "hall"),
-                    robot.cancel,
+                    guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
                     keep=False,
                 ),
             ),
@@ -715,43 +600,25 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(pharmacy) and not open(pharmacy_door) and known bolted(…",
-                    lambda: all_of(
-                        robot.at("pharmacy"),
-                        negated(robot.open("pharmacy_door")),
-                        robot.bolted("pharmacy_door") is not None,
-                        robot.bolted("pharmacy_door"),
-                    ),
-                ),
-                Latch(
-                    "ring(pharmacy_door,pharmacy)",
-                    lambda: robot.ring("pharmacy_door", "pharmacy"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
             Latch(
-                "call_lift(landing)",
-                lambda: robot.call_lift("landing"),
+                "ring(children_door,children)",
+                lambda: robot.ring("children_door", "children"),
                 robot.cancel,
                 guard=lambda: all_of(
-                    robot.at("landing"),
-                    robot.lift_works(),
-                    negated(robot.lift_at("landing")),
+                    robot.at("children"),
+                    negated(robot.open("children_door")),
+                    robot.bolted("children_door"),
                 ),
                 keep=False,
             ),
             Latch(
-                "call_lift(hall)",
-                lambda: robot.call_lift("hall"),
+                "ring(pharmacy_door,hall)",
+                lambda: robot.ring("pharmacy_door", "hall"),
                 robot.cancel,
                 guard=lambda: all_of(
                     robot.at("hall"),
-                    robot.lift_works(),
-                    negated(robot.lift_at("hall")),
+                    negated(robot.open("pharmacy_door")),
+                    robot.bolted("pharmacy_door"),
                 ),
                 keep=False,
             ),

@@ -349,242 +349,147 @@ def create_root(robot: Robot) -> Behaviour:
         robot,
         fallback(
             "fallback",
-            sequence(
-                "sequence",
-                Condition("given(insulin)", lambda: robot.given("insulin")),
-                Condition("given(saline)", lambda: robot.given("saline")),
+            Condition(
+                "(given(insulin) and given(saline))",
+                lambda: all_of(robot.given("insulin"), robot.given("saline")),
             ),
-            sequence(
-                "sequence",
-                Condition("not lift_works()", lambda: negated(robot.lift_works())),
-                Latch("report_lift()", robot.report_lift, robot.cancel, keep=False),
+            Latch(
+                "report_lift()",
+                robot.report_lift,
+                robot.cancel,
+                guard=lambda: negated(robot.lift_works()),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("at(surgery)", lambda: robot.at("surgery")),
-                Condition("not open(surgery_door)", lambda: negated(robot.open("surgery_door"))),
-                Latch(
-                    "push(surgery_door,surgery)",
-                    lambda: robot.push("surgery_door", "surgery"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("surgery"),
-                        negated(robot.open("surgery_door")),
-                        any_of(
-                            negated(robot.bolted("surgery_door")),
-                            robot.bolted("surgery_door") is None,
-                        ),
+            Latch(
+                "charge(hall)",
+                lambda: robot.charge("hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
+                keep=False,
+            ),
+            Latch(
+                "charge(landing)",
+                lambda: robot.charge("landing"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("landing"), robot.battery_low()),
+                keep=False,
+            ),
+            Latch(
+                "push(surgery_door,surgery)",
+                lambda: robot.push("surgery_door", "surgery"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("surgery"),
+                    negated(robot.open("surgery_door")),
+                    any_of(
+                        negated(robot.bolted("surgery_door")),
+                        robot.bolted("surgery_door") is None,
                     ),
-                    keep=False,
                 ),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("at(hall)", lambda: robot.at("hall")),
-                Condition("not lift_at(hall)", lambda: negated(robot.lift_at("hall"))),
-                Latch("call_lift(hall)", lambda: robot.call_lift("hall"), robot.cancel, keep=False),
+            Latch(
+                "look_for(olga,children)",
+                lambda: robot.look_for("olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), robot.present("olga") is None),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("known present(olga)", lambda: robot.present("olga") is not None),
-                Condition("not present(olga)", lambda: negated(robot.present("olga"))),
-                Latch(
-                    "page(olga,children)",
-                    lambda: robot.page("olga", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("children"), negated(robot.present("olga"))),
-                    keep=False,
+            Latch(
+                "page(olga,children)",
+                lambda: robot.page("olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), negated(robot.present("olga"))),
+                keep=False,
+            ),
+            Latch(
+                "push(children_door,landing)",
+                lambda: robot.push("children_door", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    negated(robot.open("children_door")),
+                    any_of(
+                        negated(robot.bolted("children_door")),
+                        robot.bolted("children_door") is None,
+                    ),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "look_for(pavel,surgery)",
+                lambda: robot.look_for("pavel", "surgery"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("surgery"), robot.present("pavel") is None),
+                keep=False,
+            ),
+            Latch(
+                "page(pavel,surgery)",
+                lambda: robot.page("pavel", "surgery"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("surgery"), negated(robot.present("pavel"))),
+                keep=False,
+            ),
+            Latch(
+                "pick_up(saline,hall)",
+                lambda: robot.pick_up("saline", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    robot.lies_in("saline", "hall"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.on_tray("saline")),
+                    negated(robot.battery_low()),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "call_lift(hall)",
+                lambda: robot.call_lift("hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    robot.lift_works(),
+                    negated(robot.lift_at("hall")),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "hand_over(insulin,olga,children)",
+                lambda: robot.hand_over("insulin", "olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.on_tray("insulin"),
+                    robot.present("olga"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "ring(children_door,landing)",
+                lambda: robot.ring("children_door", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    negated(robot.open("children_door")),
+                    robot.bolted("children_door"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "hand_over(saline,pavel,surgery)",
+                lambda: robot.hand_over("saline", "pavel", "surgery"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("surgery"),
+                    robot.on_tray("saline"),
+                    robot.present("pavel"),
+                ),
+                keep=False,
             ),
             sequence(
                 "sequence",
                 Condition("on_tray(insulin)", lambda: robot.on_tray("insulin")),
-                Condition("known present(olga)", lambda: robot.present("olga") is not None),
-                Condition("present(olga)", lambda: robot.present("olga")),
-                Latch(
-                    "hand_over(insulin,olga,children)",
-                    lambda: robot.hand_over("insulin", "olga", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("children"),
-                        robot.on_tray("insulin"),
-                        robot.present("olga"),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(children)", lambda: robot.at("children")),
-                Condition("unknown present(olga)", lambda: robot.present("olga") is None),
-                Latch(
-                    "look_for(olga,children)",
-                    lambda: robot.look_for("olga", "children"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("lies_in(saline,hall)", lambda: robot.lies_in("saline", "hall")),
-                Latch(
-                    "pick_up(saline,hall)",
-                    lambda: robot.pick_up("saline", "hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("hall"),
-                        robot.lies_in("saline", "hall"),
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.on_tray("saline")),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(hall)", lambda: robot.at("hall")),
-                Condition("battery_low()", robot.battery_low),
-                Latch("charge(hall)", lambda: robot.charge("hall"), robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("battery_low()", robot.battery_low),
-                Condition("at(landing)", lambda: robot.at("landing")),
-                Latch("charge(landing)", lambda: robot.charge("landing"), robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("open(children_door)", lambda: robot.open("children_door")),
-                Condition("at(landing)", lambda: robot.at("landing")),
-                Latch(
-                    "drive(children_door,landing,children)",
-                    lambda: robot.drive("children_door", "landing", "children"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(children)", lambda: robot.at("children")),
-                Condition("not battery_low()", lambda: negated(robot.battery_low())),
-                Latch(
-                    "pick_up(insulin,children)",
-                    lambda: robot.pick_up("insulin", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("children"),
-                        robot.lies_in("insulin", "children"),
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.on_tray("saline")),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("open(children_door)", lambda: robot.open("children_door")),
-                Latch(
-                    "drive(children_door,children,landing)",
-                    lambda: robot.drive("children_door", "children", "landing"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("children"), robot.open("children_door")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("known present(pavel)", lambda: robot.present("pavel") is not None),
-                Condition("not present(pavel)", lambda: negated(robot.present("pavel"))),
-                Latch(
-                    "page(pavel,surgery)",
-                    lambda: robot.page("pavel", "surgery"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("surgery"), negated(robot.present("pavel"))),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(children)", lambda: robot.at("children")),
-                Latch(
-                    "push(children_door,children)",
-                    lambda: robot.push("children_door", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("children"),
-                        negated(robot.open("children_door")),
-                        any_of(
-                            negated(robot.bolted("children_door")),
-                            robot.bolted("children_door") is None,
-                        ),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "known bolted(children_door)",
-                    lambda: robot.bolted("children_door") is not None,
-                ),
-                fallback(
-                    "fallback",
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "not bolted(children_door)",
-                            lambda: negated(robot.bolted("children_door")),
-                        ),
-                        Latch(
-                            "push(children_door,landing)",
-                            lambda: robot.push("children_door", "landing"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                robot.at("landing"),
-                                negated(robot.open("children_door")),
-                                any_of(
-                                    negated(robot.bolted("children_door")),
-                                    robot.bolted("children_door") is None,
-                                ),
-                            ),
-                            keep=False,
-                        ),
-                    ),
-                    sequence(
-                        "sequence",
-                        Condition("bolted(children_door)", lambda: robot.bolted("children_door")),
-                        Latch(
-                            "ring(children_door,landing)",
-                            lambda: robot.ring("children_door", "landing"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                robot.at("landing"),
-                                negated(robot.open("children_door")),
-                                robot.bolted("children_door"),
-                            ),
-                            keep=False,
-                        ),
-                    ),
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(landing)", lambda: robot.at("landing")),
-                Latch(
-                    "push(children_door,landing)",
-                    lambda: robot.push("children_door", "landing"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "not lies_in(insulin,hall)",
-                    lambda: negated(robot.lies_in("insulin", "hall")),
-                ),
                 Latch(
                     "ride(hall,landing)",
                     lambda: robot.ride("hall", "landing"),
@@ -598,10 +503,46 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
+            Latch(
+                "pick_up(insulin,children)",
+                lambda: robot.pick_up("insulin", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.lies_in("insulin", "children"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.on_tray("saline")),
+                    negated(robot.battery_low()),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(children_door,children,landing)",
+                lambda: robot.drive("children_door", "children", "landing"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("children"), robot.open("children_door")),
+                keep=False,
+            ),
+            Latch(
+                "push(children_door,children)",
+                lambda: robot.push("children_door", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    negated(robot.open("children_door")),
+                    any_of(
+                        negated(robot.bolted("children_door")),
+                        robot.bolted("children_door") is None,
+                    ),
+                ),
+                keep=False,
+            ),
             sequence(
                 "sequence",
-                Condition("not on_tray(saline)", lambda: negated(robot.on_tray("saline"))),
-                Condition("battery_low()", robot.battery_low),
+                Condition(
+                    "not lies_in(saline,surgery)",
+                    lambda: negated(robot.lies_in("saline", "surgery")),
+                ),
                 Latch(
                     "drive(surgery_door,surgery,hall)",
                     lambda: robot.drive("surgery_door", "surgery", "hall"),
@@ -610,38 +551,123 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
+            Latch(
+                "ring(surgery_door,surgery)",
+                lambda: robot.ring("surgery_door", "surgery"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("surgery"),
+                    negated(robot.open("surgery_door")),
+                    robot.bolted("surgery_door"),
+                ),
+                keep=False,
+            ),
             sequence(
                 "sequence",
-                Condition("on_tray(saline)", lambda: robot.on_tray("saline")),
-                Condition("known present(pavel)", lambda: robot.present("pavel") is not None),
-                Condition("present(pavel)", lambda: robot.present("pavel")),
+                Condition(
+                    "(not on_tray(insulin) and not given(saline))",
+                    lambda: all_of(
+                        negated(robot.on_tray("insulin")),
+                        negated(robot.given("saline")),
+                    ),
+                ),
                 Latch(
-                    "hand_over(saline,pavel,surgery)",
-                    lambda: robot.hand_over("saline", "pavel", "surgery"),
+                    "ride(landing,hall)",
+                    lambda: robot.ride("landing", "hall"),
                     robot.cancel,
                     guard=lambda: all_of(
-                        robot.at("surgery"),
-                        robot.on_tray("saline"),
-                        robot.present("pavel"),
+                        robot.at("landing"),
+                        robot.lift_at("landing"),
+                        robot.lift_works(),
+                        negated(robot.battery_low()),
                     ),
                     keep=False,
                 ),
             ),
+            Latch(
+                "ring(children_door,children)",
+                lambda: robot.ring("children_door", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    negated(robot.open("children_door")),
+                    robot.bolted("children_door"),
+                ),
+                keep=False,
+            ),
             sequence(
                 "sequence",
-                Condition("at(surgery)", lambda: robot.at("surgery")),
-                Condition("unknown present(pavel)", lambda: robot.present("pavel") is None),
-                Latch(
-                    "look_for(pavel,surgery)",
-                    lambda: robot.look_for("pavel", "surgery"),
-                    robot.cancel,
-                    keep=False,
+                Condition("not given(saline)", lambda: negated(robot.given("saline"))),
+                fallback(
+                    "fallback",
+                    Latch(
+                        "drive(surgery_door,hall,surgery)",
+                        lambda: robot.drive("surgery_door", "hall", "surgery"),
+                        robot.cancel,
+                        guard=lambda: all_of(robot.at("hall"), robot.open("surgery_door")),
+                        keep=False,
+                    ),
+                    Latch(
+                        "push(surgery_door,hall)",
+                        lambda: robot.push("surgery_door", "hall"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            robot.at("hall"),
+                            negated(robot.open("surgery_door")),
+                            any_of(
+                                negated(robot.bolted("surgery_door")),
+                                robot.bolted("surgery_door") is None,
+                            ),
+                        ),
+                        keep=False,
+                    ),
                 ),
             ),
             sequence(
                 "sequence",
+                Condition("on_tray(insulin)", lambda: robot.on_tray("insulin")),
+                Latch(
+                    "drive(children_door,landing,children)",
+                    lambda: robot.drive("children_door", "landing", "children"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "pick_up(saline,surgery)",
+                lambda: robot.pick_up("saline", "surgery"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("surgery"),
+                    robot.lies_in("saline", "surgery"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.on_tray("saline")),
+                    negated(robot.battery_low()),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(surgery_door,surgery,hall)",
+                lambda: robot.drive("surgery_door", "surgery", "hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("surgery"), robot.open("surgery_door")),
+                keep=False,
+            ),
+            Latch(
+                "call_lift(landing)",
+                lambda: robot.call_lift("landing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("landing"),
+                    robot.lift_works(),
+                    negated(robot.lift_at("landing")),
+                ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
                 Condition("given(saline)", lambda: robot.given("saline")),
-                Condition("at(hall)", lambda: robot.at("hall")),
                 Latch(
                     "pick_up(insulin,hall)",
                     lambda: robot.pick_up("insulin", "hall"),
@@ -658,87 +684,61 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition("open(surgery_door)", lambda: robot.open("surgery_door")),
-                Condition("at(hall)", lambda: robot.at("hall")),
-                Latch(
-                    "drive(surgery_door,hall,surgery)",
-                    lambda: robot.drive("surgery_door", "hall", "surgery"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("given(saline)", lambda: robot.given("saline")),
-                Latch(
-                    "drive(surgery_door,surgery,hall)",
-                    lambda: robot.drive("surgery_door", "surgery", "hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("surgery"), robot.open("surgery_door")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(surgery)", lambda: robot.at("surgery")),
-                Latch(
-                    "pick_up(saline,surgery)",
-                    lambda: robot.pick_up("saline", "surgery"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("surgery"),
-                        robot.lies_in("saline", "surgery"),
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.on_tray("saline")),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                fallback(
-                    "fallback",
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "known bolted(surgery_door)",
-                            lambda: robot.bolted("surgery_door") is not None,
-                        ),
-                        Condition(
-                            "not bolted(surgery_door)",
-                            lambda: negated(robot.bolted("surgery_door")),
-                        ),
-                    ),
-                    Condition(
-                        "unknown bolted(surgery_door)",
-                        lambda: robot.bolted("surgery_door") is None,
+                Condition(
+                    "(known bolted(surgery_door) and bolted(surgery_door))",
+                    lambda: all_of(
+                        robot.bolted("surgery_door") is not None,
+                        robot.bolted("surgery_door"),
                     ),
                 ),
                 Latch(
-                    "push(surgery_door,hall)",
-                    lambda: robot.push("surgery_door", "hall"),
+                    "ring(surgery_door,hall)",
+                    lambda: robot.ring("surgery_door", "hall"),
                     robot.cancel,
                     guard=lambda: all_of(
                         robot.at("hall"),
                         negated(robot.open("surgery_door")),
-                        any_of(
-                            negated(robot.bolted("surgery_door")),
-                            robot.bolted("surgery_door") is None,
-                        ),
+                        robot.bolted("surgery_door"),
                     ),
                     keep=False,
                 ),
             ),
             Latch(
-                "ring(surgery_door,hall)",
-                lambda: robot.ring("surgery_door", "hall"),
+                "ride(hall,landing)",
+                lambda: robot.ride("hall", "landing"),
                 robot.cancel,
                 guard=lambda: all_of(
                     robot.at("hall"),
-                    negated(robot.open("surgery_door")),
-                    robot.bolted("surgery_door"),
+                    robot.lift_at("hall"),
+                    robot.lift_works(),
+                    negated(robot.battery_low()),
                 ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "not lies_in(insulin,children)",
+                    lambda: negated(robot.lies_in("insulin", "children")),
+                ),
+                Latch(
+                    "ride(landing,hall)",
+                    lambda: robot.ride("landing", "hall"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.at("landing"),
+                        robot.lift_at("landing"),
+                        robot.lift_works(),
+                        negated(robot.battery_low()),
+                    ),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "drive(children_door,landing,children)",
+                lambda: robot.drive("children_door", "landing", "children"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
                 keep=False,
             ),
         ),
@@ -863,6 +863,7 @@ READS: dict[Fact, bool] = {
     ("lies_in", "saline", "hall"): False,
     ("lies_in", "saline", "surgery"): False,
     ("lift_at", "hall"): False,
+    ("lift_at", "landing"): False,
     ("lift_works",): False,
     ("on_tray", "insulin"): False,
     ("on_tray", "saline"): False,
@@ -910,6 +911,13 @@ ACTIONS: dict[Fact, list[Factor]] = {
     ("call_lift", "hall"): [
         [
             Outcome("9/10", {("lift_at", "hall"): True, ("lift_at", "landing"): False}),
+            Outcome("1/20", {("lift_works",): False}),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("call_lift", "landing"): [
+        [
+            Outcome("9/10", {("lift_at", "hall"): False, ("lift_at", "landing"): True}),
             Outcome("1/20", {("lift_works",): False}),
             Outcome("1/20", {}),
         ],
@@ -1134,6 +1142,26 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("1/20", {("lift_works",): False}),
         ],
     ],
+    ("ride", "landing", "hall"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "hall"): True,
+                    ("at", "landing"): False,
+                    ("lift_at", "hall"): True,
+                    ("lift_at", "landing"): False,
+                },
+            ),
+            Outcome("1/20", {("lift_works",): False}),
+        ],
+    ],
+    ("ring", "children_door", "children"): [
+        [
+            Outcome("3/4", {("bolted", "children_door"): False, ("open", "children_door"): True}),
+            Outcome("1/4", {}),
+        ],
+    ],
     ("ring", "children_door", "landing"): [
         [
             Outcome("3/4", {("bolted", "children_door"): False, ("open", "children_door"): True}),
@@ -1141,6 +1169,12 @@ ACTIONS: dict[Fact, list[Factor]] = {
         ],
     ],
     ("ring", "surgery_door", "hall"): [
+        [
+            Outcome("3/4", {("bolted", "surgery_door"): False, ("open", "surgery_door"): True}),
+            Outcome("1/4", {}),
+        ],
+    ],
+    ("ring", "surgery_door", "surgery"): [
         [
             Outcome("3/4", {("bolted", "surgery_door"): False, ("open", "surgery_door"): True}),
             Outcome("1/4", {}),

@@ -74,11 +74,23 @@ def in_words(fact: Fact) -> str:
     return f"{fact[0]}({','.join(fact[1:])})"
 
 
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
 def any_of(*values: bool | None) -> bool | None:
     """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
     if True in values:
         return True
     return None if None in values else False
+
+
+def negated(value: bool | None) -> bool | None:
+    """Three-valued "not": unknown stays unknown."""
+    return None if value is None else not value
 
 
 class Condition(Behaviour):
@@ -299,61 +311,54 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        sequence(
-            "sequence",
-            fallback(
-                "fallback",
+        fallback(
+            "fallback",
+            Condition(
+                "(known in_range(pressure) and at(pump_hall))",
+                lambda: all_of(robot.in_range("pressure") is not None, robot.at("pump_hall")),
+            ),
+            Latch(
+                "drive(boiler_room)",
+                lambda: robot.drive("boiler_room"),
+                robot.cancel,
+                guard=lambda: negated(robot.at("boiler_room")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
                 Condition(
                     "known in_range(pressure)",
                     lambda: robot.in_range("pressure") is not None,
                 ),
-                sequence(
-                    "sequence",
-                    fallback(
-                        "fallback",
-                        Condition("at(boiler_room)", lambda: robot.at("boiler_room")),
-                        Latch(
-                            "drive(boiler_room)",
-                            lambda: robot.drive("boiler_room"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    fallback(
-                        "fallback",
-                        Condition(
-                            "(lit(boiler_room) or torch_on())",
-                            lambda: any_of(robot.lit("boiler_room"), robot.torch_on()),
-                        ),
-                        Latch(
-                            "switch_lamps_on(boiler_room)",
-                            lambda: robot.switch_lamps_on("boiler_room"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    fallback(
-                        "fallback",
-                        Condition("lens_clean()", robot.lens_clean),
-                        Latch("wipe_lens()", robot.wipe_lens, robot.cancel, keep=False),
-                    ),
-                    Latch(
-                        "read_gauge(pressure,boiler_room)",
-                        lambda: robot.read_gauge("pressure", "boiler_room"),
-                        robot.cancel,
-                        keep=False,
-                    ),
-                ),
-            ),
-            fallback(
-                "fallback",
-                Condition("at(pump_hall)", lambda: robot.at("pump_hall")),
                 Latch(
                     "drive(pump_hall)",
                     lambda: robot.drive("pump_hall"),
                     robot.cancel,
                     keep=False,
                 ),
+            ),
+            Latch(
+                "read_gauge(pressure,boiler_room)",
+                lambda: robot.read_gauge("pressure", "boiler_room"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.in_range("pressure") is None,
+                    robot.at("boiler_room"),
+                    any_of(robot.lit("boiler_room"), robot.torch_on()),
+                    robot.lens_clean(),
+                ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("not lens_clean()", lambda: negated(robot.lens_clean())),
+                Latch("wipe_lens()", robot.wipe_lens, robot.cancel, keep=False),
+            ),
+            Latch(
+                "switch_lamps_on(boiler_room)",
+                lambda: robot.switch_lamps_on("boiler_room"),
+                robot.cancel,
+                keep=False,
             ),
         ),
         READS,

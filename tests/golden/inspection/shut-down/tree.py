@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector, Sequence
+from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -75,6 +75,20 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
 
 
 def negated(value: bool | None) -> bool | None:
@@ -180,26 +194,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Skipper(Composite):
-    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
-
-    def tick(self) -> Iterator[Behaviour]:
-        status = Status.RUNNING
-        for child in self.children:
-            yield from child.tick()
-            self.current_child = child
-            status = child.status
-            if status != Status.RUNNING:
-                break
-        if status != Status.RUNNING:
-            for child in self.children:
-                if child is not self.current_child and child.status != Status.INVALID:
-                    child.stop(Status.INVALID)
-            self.stop(status)
-        self.status = status
-        yield self
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -208,11 +202,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def skipper(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children are running. Every tick starts at the first child."""
-    return Skipper(name, children=list(children))
 
 
 @runtime_checkable
@@ -327,62 +316,44 @@ def create_root(robot: Robot) -> Behaviour:
         robot,
         fallback(
             "fallback",
-            skipper(
-                "skipper",
-                Condition("closed(drain)", lambda: robot.closed("drain")),
-                fallback(
-                    "fallback",
-                    sequence(
-                        "sequence",
-                        Condition("not at(cellar)", lambda: negated(robot.at("cellar"))),
-                        Latch(
-                            "drive(cellar)",
-                            lambda: robot.drive("cellar"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    sequence(
-                        "sequence",
-                        Condition("lit(cellar)", lambda: robot.lit("cellar")),
-                        Latch(
-                            "look_at_valve(drain,cellar)",
-                            lambda: robot.look_at_valve("drain", "cellar"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    sequence(
-                        "sequence",
-                        Condition("not torch_on()", lambda: negated(robot.torch_on())),
-                        Latch(
-                            "switch_lamps_on(cellar)",
-                            lambda: robot.switch_lamps_on("cellar"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
-                        "look_at_valve(drain,cellar)",
-                        lambda: robot.look_at_valve("drain", "cellar"),
-                        robot.cancel,
-                        keep=False,
-                    ),
+            Condition(
+                "(known closed(drain) and closed(drain))",
+                lambda: all_of(robot.closed("drain") is not None, robot.closed("drain")),
+            ),
+            Latch(
+                "drive(cellar)",
+                lambda: robot.drive("cellar"),
+                robot.cancel,
+                guard=lambda: negated(robot.at("cellar")),
+                keep=False,
+            ),
+            Latch(
+                "shake_loose(drain)",
+                lambda: robot.shake_loose("drain"),
+                robot.cancel,
+                guard=lambda: robot.jammed("drain"),
+                keep=False,
+            ),
+            Latch(
+                "look_at_valve(drain,cellar)",
+                lambda: robot.look_at_valve("drain", "cellar"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.closed("drain") is None,
+                    robot.at("cellar"),
+                    any_of(robot.lit("cellar"), robot.torch_on()),
                 ),
+                keep=False,
             ),
             sequence(
                 "sequence",
-                Condition("jammed(drain)", lambda: robot.jammed("drain")),
-                Latch(
-                    "shake_loose(drain)",
-                    lambda: robot.shake_loose("drain"),
-                    robot.cancel,
-                    keep=False,
+                Condition(
+                    "(known closed(drain) and not closed(drain))",
+                    lambda: all_of(
+                        robot.closed("drain") is not None,
+                        negated(robot.closed("drain")),
+                    ),
                 ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(cellar)", lambda: robot.at("cellar")),
                 Latch(
                     "turn_valve(drain,cellar)",
                     lambda: robot.turn_valve("drain", "cellar"),
@@ -390,7 +361,12 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
-            Latch("drive(cellar)", lambda: robot.drive("cellar"), robot.cancel, keep=False),
+            Latch(
+                "switch_lamps_on(cellar)",
+                lambda: robot.switch_lamps_on("cellar"),
+                robot.cancel,
+                keep=False,
+            ),
         ),
         READS,
     )

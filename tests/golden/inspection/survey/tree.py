@@ -59,6 +59,9 @@ class Robot(Protocol):
     def switch_lamps_on(self, area: str) -> Status:
         """Start or continue switch_lamps_on(area)."""
 
+    def switch_torch_on(self) -> Status:
+        """Start or continue switch_torch_on()."""
+
 
 Fact = tuple[str, ...]
 
@@ -307,51 +310,43 @@ def create_root(robot: Robot) -> Behaviour:
         robot,
         fallback(
             "fallback",
-            sequence(
-                "sequence",
-                Condition("known closed(inlet)", lambda: robot.closed("inlet") is not None),
-                Condition("known closed(drain)", lambda: robot.closed("drain") is not None),
-            ),
-            sequence(
-                "sequence",
-                Condition("unknown closed(inlet)", lambda: robot.closed("inlet") is None),
-                Condition("at(pump_hall)", lambda: robot.at("pump_hall")),
-                Latch(
-                    "look_at_valve(inlet,pump_hall)",
-                    lambda: robot.look_at_valve("inlet", "pump_hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.closed("inlet") is None,
-                        robot.at("pump_hall"),
-                        any_of(robot.lit("pump_hall"), robot.torch_on()),
-                    ),
-                    keep=False,
+            Condition(
+                "(known closed(inlet) and known closed(drain))",
+                lambda: all_of(
+                    robot.closed("inlet") is not None,
+                    robot.closed("drain") is not None,
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition("not at(cellar)", lambda: negated(robot.at("cellar"))),
-                Latch("drive(cellar)", lambda: robot.drive("cellar"), robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("lit(cellar)", lambda: robot.lit("cellar")),
-                Condition("unknown closed(drain)", lambda: robot.closed("drain") is None),
-                Latch(
-                    "look_at_valve(drain,cellar)",
-                    lambda: robot.look_at_valve("drain", "cellar"),
-                    robot.cancel,
-                    keep=False,
+            Latch(
+                "look_at_valve(drain,cellar)",
+                lambda: robot.look_at_valve("drain", "cellar"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.closed("drain") is None,
+                    robot.at("cellar"),
+                    any_of(robot.lit("cellar"), robot.torch_on()),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "look_at_valve(inlet,pump_hall)",
+                lambda: robot.look_at_valve("inlet", "pump_hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.closed("inlet") is None,
+                    robot.at("pump_hall"),
+                    any_of(robot.lit("pump_hall"), robot.torch_on()),
+                ),
+                keep=False,
             ),
             sequence(
                 "sequence",
                 Condition("unknown closed(drain)", lambda: robot.closed("drain") is None),
-                Condition("not torch_on()", lambda: negated(robot.torch_on())),
                 Latch(
-                    "switch_lamps_on(cellar)",
-                    lambda: robot.switch_lamps_on("cellar"),
+                    "drive(cellar)",
+                    lambda: robot.drive("cellar"),
                     robot.cancel,
+                    guard=lambda: negated(robot.at("cellar")),
                     keep=False,
                 ),
             ),
@@ -367,16 +362,13 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             Latch(
-                "look_at_valve(drain,cellar)",
-                lambda: robot.look_at_valve("drain", "cellar"),
+                "switch_lamps_on(cellar)",
+                lambda: robot.switch_lamps_on("cellar"),
                 robot.cancel,
-                guard=lambda: all_of(
-                    robot.closed("drain") is None,
-                    robot.at("cellar"),
-                    any_of(robot.lit("cellar"), robot.torch_on()),
-                ),
+                guard=lambda: robot.at("cellar"),
                 keep=False,
             ),
+            Latch("switch_torch_on()", robot.switch_torch_on, robot.cancel, keep=False),
         ),
         READS,
     )
@@ -558,6 +550,7 @@ ACTIONS: dict[Fact, list[Factor]] = {
     ("switch_lamps_on", "cellar"): [
         [Outcome("4/5", {("lit", "cellar"): True}), Outcome("1/5", {})],
     ],
+    ("switch_torch_on",): [[Outcome("1", {("torch_on",): True})]],
 }
 """What each action does: independent choices between outcomes."""
 
@@ -585,6 +578,9 @@ class SimulatedWorld(World):
 
     def switch_lamps_on(self, area: str) -> Status:
         return self._act("switch_lamps_on", area)
+
+    def switch_torch_on(self) -> Status:
+        return self._act("switch_torch_on")
 
 
 def main() -> None:

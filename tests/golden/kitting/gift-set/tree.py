@@ -306,70 +306,81 @@ def create_root(robot: Robot) -> Behaviour:
         robot,
         fallback(
             "fallback",
+            Condition(
+                "(packed(wine,crate1) and packed(chocolates,crate1))",
+                lambda: all_of(
+                    robot.packed("wine", "crate1"),
+                    robot.packed("chocolates", "crate1"),
+                ),
+            ),
+            Latch(
+                "read_force_sensor(chocolates)",
+                lambda: robot.read_force_sensor("chocolates"),
+                robot.cancel,
+                guard=lambda: robot.holding("chocolates") is None,
+                keep=False,
+            ),
+            Latch(
+                "place(chocolates,crate1)",
+                lambda: robot.place("chocolates", "crate1"),
+                robot.cancel,
+                guard=lambda: robot.holding("chocolates"),
+                keep=False,
+            ),
+            Latch(
+                "read_force_sensor(wine)",
+                lambda: robot.read_force_sensor("wine"),
+                robot.cancel,
+                guard=lambda: robot.holding("wine") is None,
+                keep=False,
+            ),
+            Latch(
+                "place(wine,crate1)",
+                lambda: robot.place("wine", "crate1"),
+                robot.cancel,
+                guard=lambda: robot.holding("wine"),
+                keep=False,
+            ),
             sequence(
                 "sequence",
                 Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                Latch(
+                    "look_for(chocolates)",
+                    lambda: robot.look_for("chocolates"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.in_view("chocolates")),
+                        negated(robot.lost("chocolates")),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
                 Condition(
                     "packed(chocolates,crate1)",
                     lambda: robot.packed("chocolates", "crate1"),
                 ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "known holding(chocolates)",
-                    lambda: robot.holding("chocolates") is not None,
-                ),
-                Condition("holding(chocolates)", lambda: robot.holding("chocolates")),
                 Latch(
-                    "place(chocolates,crate1)",
-                    lambda: robot.place("chocolates", "crate1"),
+                    "look_for(wine)",
+                    lambda: robot.look_for("wine"),
                     robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("known holding(wine)", lambda: robot.holding("wine") is not None),
-                Condition("holding(wine)", lambda: robot.holding("wine")),
-                Latch(
-                    "place(wine,crate1)",
-                    lambda: robot.place("wine", "crate1"),
-                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.in_view("wine")),
+                        negated(robot.lost("wine")),
+                    ),
                     keep=False,
                 ),
             ),
             sequence(
                 "sequence",
                 Condition(
-                    "unknown holding(chocolates)",
-                    lambda: robot.holding("chocolates") is None,
+                    "(not packed(chocolates,crate1) and not lost(wine))",
+                    lambda: all_of(
+                        negated(robot.packed("chocolates", "crate1")),
+                        negated(robot.lost("wine")),
+                    ),
                 ),
-                Latch(
-                    "read_force_sensor(chocolates)",
-                    lambda: robot.read_force_sensor("chocolates"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("unknown holding(wine)", lambda: robot.holding("wine") is None),
-                Latch(
-                    "read_force_sensor(wine)",
-                    lambda: robot.read_force_sensor("wine"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("in_view(chocolates)", lambda: robot.in_view("chocolates")),
-                Condition(
-                    "not packed(chocolates,crate1)",
-                    lambda: negated(robot.packed("chocolates", "crate1")),
-                ),
-                Condition("not lost(wine)", lambda: negated(robot.lost("wine"))),
                 Latch(
                     "pick(chocolates)",
                     lambda: robot.pick("chocolates"),
@@ -385,18 +396,58 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition("not in_view(wine)", lambda: negated(robot.in_view("wine"))),
-                Condition("not lost(wine)", lambda: negated(robot.lost("wine"))),
                 Condition("not lost(chocolates)", lambda: negated(robot.lost("chocolates"))),
-                Latch("look_for(wine)", lambda: robot.look_for("wine"), robot.cancel, keep=False),
+                Latch(
+                    "pick(wine)",
+                    lambda: robot.pick("wine"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.gripper_free(),
+                        robot.in_view("wine"),
+                        negated(robot.holding("wine")),
+                        negated(robot.lost("wine")),
+                    ),
+                    keep=False,
+                ),
             ),
             sequence(
                 "sequence",
-                Condition("in_view(wine)", lambda: robot.in_view("wine")),
-                Condition("not lost(chocolates)", lambda: negated(robot.lost("chocolates"))),
+                Condition("not lost(wine)", lambda: negated(robot.lost("wine"))),
+                Latch(
+                    "look_for(chocolates)",
+                    lambda: robot.look_for("chocolates"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.in_view("chocolates")),
+                        negated(robot.lost("chocolates")),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
                 Condition(
-                    "not packed(wine,crate1)",
-                    lambda: negated(robot.packed("wine", "crate1")),
+                    "not packed(chocolates,crate1)",
+                    lambda: negated(robot.packed("chocolates", "crate1")),
+                ),
+                Latch(
+                    "pick(chocolates)",
+                    lambda: robot.pick("chocolates"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.gripper_free(),
+                        robot.in_view("chocolates"),
+                        negated(robot.holding("chocolates")),
+                        negated(robot.lost("chocolates")),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "packed(chocolates,crate1)",
+                    lambda: robot.packed("chocolates", "crate1"),
                 ),
                 Latch(
                     "pick(wine)",
@@ -413,8 +464,37 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
-                Condition("not lost(chocolates)", lambda: negated(robot.lost("chocolates"))),
+                Condition("not gripper_free()", lambda: negated(robot.gripper_free())),
+                fallback(
+                    "fallback",
+                    Latch(
+                        "look_for(wine)",
+                        lambda: robot.look_for("wine"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            negated(robot.in_view("wine")),
+                            negated(robot.lost("wine")),
+                        ),
+                        keep=False,
+                    ),
+                    Latch(
+                        "look_for(chocolates)",
+                        lambda: robot.look_for("chocolates"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            negated(robot.in_view("chocolates")),
+                            negated(robot.lost("chocolates")),
+                        ),
+                        keep=False,
+                    ),
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "packed(chocolates,crate1)",
+                    lambda: robot.packed("chocolates", "crate1"),
+                ),
                 Latch(
                     "look_for(chocolates)",
                     lambda: robot.look_for("chocolates"),
@@ -422,6 +502,20 @@ def create_root(robot: Robot) -> Behaviour:
                     guard=lambda: all_of(
                         negated(robot.in_view("chocolates")),
                         negated(robot.lost("chocolates")),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                Latch(
+                    "look_for(wine)",
+                    lambda: robot.look_for("wine"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.in_view("wine")),
+                        negated(robot.lost("wine")),
                     ),
                     keep=False,
                 ),

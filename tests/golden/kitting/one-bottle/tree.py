@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -184,11 +184,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-def sequence(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children succeed. Every tick starts at the first child."""
-    return Sequence(name, memory=False, children=list(children))
-
-
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
@@ -307,56 +302,38 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("packed(water,tray1)", lambda: robot.packed("water", "tray1")),
-            sequence(
-                "sequence",
-                Condition("known holding(water)", lambda: robot.holding("water") is not None),
-                Condition("holding(water)", lambda: robot.holding("water")),
-                Latch(
-                    "place(water,tray1)",
-                    lambda: robot.place("water", "tray1"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "read_force_sensor(water)",
+                lambda: robot.read_force_sensor("water"),
+                robot.cancel,
+                guard=lambda: robot.holding("water") is None,
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("unknown holding(water)", lambda: robot.holding("water") is None),
-                Latch(
-                    "read_force_sensor(water)",
-                    lambda: robot.read_force_sensor("water"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "place(water,tray1)",
+                lambda: robot.place("water", "tray1"),
+                robot.cancel,
+                guard=lambda: robot.holding("water"),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("in_view(water)", lambda: robot.in_view("water")),
-                Latch(
-                    "pick(water)",
-                    lambda: robot.pick("water"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.gripper_free(),
-                        robot.in_view("water"),
-                        negated(robot.holding("water")),
-                        negated(robot.lost("water")),
-                    ),
-                    keep=False,
-                ),
+            Latch(
+                "look_for(water)",
+                lambda: robot.look_for("water"),
+                robot.cancel,
+                guard=lambda: all_of(negated(robot.in_view("water")), negated(robot.lost("water"))),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("not lost(water)", lambda: negated(robot.lost("water"))),
-                Latch(
-                    "look_for(water)",
-                    lambda: robot.look_for("water"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.in_view("water")),
-                        negated(robot.lost("water")),
-                    ),
-                    keep=False,
+            Latch(
+                "pick(water)",
+                lambda: robot.pick("water"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.gripper_free(),
+                    robot.in_view("water"),
+                    negated(robot.holding("water")),
+                    negated(robot.lost("water")),
                 ),
+                keep=False,
             ),
         ),
         READS,

@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Composite, Selector, Sequence
+from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -75,6 +75,18 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def negated(value: bool | None) -> bool | None:
+    """Three-valued "not": unknown stays unknown."""
+    return None if value is None else not value
 
 
 class Condition(Behaviour):
@@ -175,26 +187,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-class Skipper(Composite):
-    """Goes on to the next child while a child is RUNNING; returns the first SUCCESS or FAILURE."""
-
-    def tick(self) -> Iterator[Behaviour]:
-        status = Status.RUNNING
-        for child in self.children:
-            yield from child.tick()
-            self.current_child = child
-            status = child.status
-            if status != Status.RUNNING:
-                break
-        if status != Status.RUNNING:
-            for child in self.children:
-                if child is not self.current_child and child.status != Status.INVALID:
-                    child.stop(Status.INVALID)
-            self.stop(status)
-        self.status = status
-        yield self
-
-
 def sequence(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children succeed. Every tick starts at the first child."""
     return Sequence(name, memory=False, children=list(children))
@@ -203,11 +195,6 @@ def sequence(name: str, *children: Behaviour) -> Behaviour:
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
-
-
-def skipper(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children are running. Every tick starts at the first child."""
-    return Skipper(name, children=list(children))
 
 
 @runtime_checkable
@@ -320,245 +307,559 @@ def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
     return StopWhenBlocked(
         robot,
-        sequence(
-            "sequence",
-            fallback(
-                "fallback",
-                Condition("at(cup1,cupboard4)", lambda: robot.at("cup1", "cupboard4")),
-                sequence(
-                    "sequence",
-                    fallback(
-                        "fallback",
-                        Condition("open(cupboard4)", lambda: robot.is_open("cupboard4")),
-                        sequence(
-                            "sequence",
-                            fallback(
-                                "fallback",
-                                Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
-                                Latch(
-                                    "walk(cupboard4)",
-                                    lambda: robot.walk("cupboard4"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                            Condition("hand_free()", robot.hand_free),
-                            Latch(
-                                "open(cupboard4)",
-                                lambda: robot.open("cupboard4"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                    ),
-                    fallback(
-                        "fallback",
-                        Condition("holding(cup1)", lambda: robot.holding("cup1")),
-                        sequence(
-                            "sequence",
-                            Condition("at(cup1,table1)", lambda: robot.at("cup1", "table1")),
-                            fallback(
-                                "fallback",
-                                Condition("near(table1)", lambda: robot.near("table1")),
-                                Latch(
-                                    "walk(table1)",
-                                    lambda: robot.walk("table1"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                            Condition("hand_free()", robot.hand_free),
-                            Latch(
-                                "pick(cup1,table1)",
-                                lambda: robot.pick("cup1", "table1"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                    ),
-                    fallback(
-                        "fallback",
-                        Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
-                        Latch(
-                            "walk(cupboard4)",
-                            lambda: robot.walk("cupboard4"),
-                            robot.cancel,
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
-                        "place(cup1,cupboard4)",
-                        lambda: robot.place("cup1", "cupboard4"),
-                        robot.cancel,
-                        keep=False,
-                    ),
+        fallback(
+            "fallback",
+            Condition(
+                "(known at(cup1,cupboard4) and at(cup1,cupboard4) and known …",
+                lambda: all_of(
+                    robot.at("cup1", "cupboard4") is not None,
+                    robot.at("cup1", "cupboard4"),
+                    robot.at("book3", "drawer6") is not None,
+                    robot.at("book3", "drawer6"),
                 ),
             ),
-            fallback(
-                "fallback",
-                Condition("at(book3,drawer6)", lambda: robot.at("book3", "drawer6")),
-                sequence(
-                    "sequence",
-                    fallback(
-                        "fallback",
-                        Condition("open(drawer6)", lambda: robot.is_open("drawer6")),
-                        sequence(
-                            "sequence",
-                            fallback(
-                                "fallback",
-                                Condition("near(drawer6)", lambda: robot.near("drawer6")),
-                                Latch(
-                                    "walk(drawer6)",
-                                    lambda: robot.walk("drawer6"),
-                                    robot.cancel,
-                                    keep=False,
-                                ),
-                            ),
-                            Condition("hand_free()", robot.hand_free),
-                            Latch(
-                                "open(drawer6)",
-                                lambda: robot.open("drawer6"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
+            Latch(
+                "look_for(book3,counter5)",
+                lambda: robot.look_for("book3", "counter5"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("counter5"), robot.at("book3", "counter5") is None),
+                keep=False,
+            ),
+            Latch(
+                "look_for(book3,shelf3)",
+                lambda: robot.look_for("book3", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("shelf3"), robot.at("book3", "shelf3") is None),
+                keep=False,
+            ),
+            Latch(
+                "look_for(book3,cupboard4)",
+                lambda: robot.look_for("book3", "cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    robot.at("book3", "cupboard4") is None,
+                    robot.is_open("cupboard4"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "open(drawer6)",
+                lambda: robot.open("drawer6"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("drawer6"),
+                    negated(robot.is_open("drawer6")),
+                    robot.hand_free(),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "place(book3,drawer6)",
+                lambda: robot.place("book3", "drawer6"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("drawer6"),
+                    robot.holding("book3"),
+                    robot.is_open("drawer6"),
+                ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(not near(cupboard4) and not hand_free() and not holding(pl…",
+                    lambda: all_of(
+                        negated(robot.near("cupboard4")),
+                        negated(robot.hand_free()),
+                        negated(robot.holding("plate2")),
+                        robot.is_open("fridge2"),
                     ),
-                    fallback(
-                        "fallback",
-                        Condition("holding(book3)", lambda: robot.holding("book3")),
-                        sequence(
-                            "sequence",
-                            skipper(
-                                "skipper",
-                                Condition(
-                                    "at(book3,counter5)",
-                                    lambda: robot.at("book3", "counter5"),
-                                ),
-                                sequence(
-                                    "sequence",
-                                    fallback(
-                                        "fallback",
-                                        Condition("near(counter5)", lambda: robot.near("counter5")),
-                                        Latch(
-                                            "walk(counter5)",
-                                            lambda: robot.walk("counter5"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                    Latch(
-                                        "look_for(book3,counter5)",
-                                        lambda: robot.look_for("book3", "counter5"),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                            ),
-                            Condition("near(counter5)", lambda: robot.near("counter5")),
-                            Condition("hand_free()", robot.hand_free),
-                            Latch(
-                                "pick(book3,counter5)",
-                                lambda: robot.pick("book3", "counter5"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        sequence(
-                            "sequence",
-                            skipper(
-                                "skipper",
-                                Condition(
-                                    "at(book3,cupboard4)",
-                                    lambda: robot.at("book3", "cupboard4"),
-                                ),
-                                sequence(
-                                    "sequence",
-                                    fallback(
-                                        "fallback",
-                                        Condition(
-                                            "near(cupboard4)",
-                                            lambda: robot.near("cupboard4"),
-                                        ),
-                                        Latch(
-                                            "walk(cupboard4)",
-                                            lambda: robot.walk("cupboard4"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                    Condition(
-                                        "open(cupboard4)",
-                                        lambda: robot.is_open("cupboard4"),
-                                    ),
-                                    Latch(
-                                        "look_for(book3,cupboard4)",
-                                        lambda: robot.look_for("book3", "cupboard4"),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                            ),
-                            Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
-                            Condition("hand_free()", robot.hand_free),
-                            Condition("open(cupboard4)", lambda: robot.is_open("cupboard4")),
-                            Latch(
-                                "pick(book3,cupboard4)",
-                                lambda: robot.pick("book3", "cupboard4"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
-                        sequence(
-                            "sequence",
-                            skipper(
-                                "skipper",
-                                Condition("at(book3,shelf3)", lambda: robot.at("book3", "shelf3")),
-                                sequence(
-                                    "sequence",
-                                    fallback(
-                                        "fallback",
-                                        Condition("near(shelf3)", lambda: robot.near("shelf3")),
-                                        Latch(
-                                            "walk(shelf3)",
-                                            lambda: robot.walk("shelf3"),
-                                            robot.cancel,
-                                            keep=False,
-                                        ),
-                                    ),
-                                    Latch(
-                                        "look_for(book3,shelf3)",
-                                        lambda: robot.look_for("book3", "shelf3"),
-                                        robot.cancel,
-                                        keep=False,
-                                    ),
-                                ),
-                            ),
-                            Condition("near(shelf3)", lambda: robot.near("shelf3")),
-                            Condition("hand_free()", robot.hand_free),
-                            Latch(
-                                "pick(book3,shelf3)",
-                                lambda: robot.pick("book3", "shelf3"),
-                                robot.cancel,
-                                keep=False,
-                            ),
-                        ),
+                ),
+                Latch(
+                    "walk(shelf3)",
+                    lambda: robot.walk("shelf3"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("shelf3")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(hand_free() and not open(drawer6) and not near(cupboard4))",
+                    lambda: all_of(
+                        robot.hand_free(),
+                        negated(robot.is_open("drawer6")),
+                        negated(robot.near("cupboard4")),
                     ),
-                    fallback(
-                        "fallback",
-                        Condition("near(drawer6)", lambda: robot.near("drawer6")),
-                        Latch(
-                            "walk(drawer6)",
-                            lambda: robot.walk("drawer6"),
-                            robot.cancel,
-                            keep=False,
-                        ),
+                ),
+                Latch("walk(drawer6)", lambda: robot.walk("drawer6"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "place(plate2,fridge2)",
+                lambda: robot.place("plate2", "fridge2"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("fridge2"),
+                    robot.holding("plate2"),
+                    robot.is_open("fridge2"),
+                ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(near(drawer6) and open(cupboard4))",
+                    lambda: all_of(robot.near("drawer6"), robot.is_open("cupboard4")),
+                ),
+                Latch(
+                    "walk(table1)",
+                    lambda: robot.walk("table1"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("table1")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(cup1,shelf3) and at(cup1,shelf3) and open(cupboar…",
+                    lambda: all_of(
+                        robot.at("cup1", "shelf3") is not None,
+                        robot.at("cup1", "shelf3"),
+                        robot.is_open("cupboard4"),
                     ),
-                    Latch(
-                        "place(book3,drawer6)",
-                        lambda: robot.place("book3", "drawer6"),
-                        robot.cancel,
-                        keep=False,
+                ),
+                Latch(
+                    "walk(shelf3)",
+                    lambda: robot.walk("shelf3"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("shelf3")),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "open(cupboard4)",
+                lambda: robot.open("cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    negated(robot.is_open("cupboard4")),
+                    robot.hand_free(),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "place(cup1,cupboard4)",
+                lambda: robot.place("cup1", "cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    robot.holding("cup1"),
+                    robot.is_open("cupboard4"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "place(plate2,shelf3)",
+                lambda: robot.place("plate2", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("shelf3"), robot.holding("plate2")),
+                keep=False,
+            ),
+            Latch(
+                "place(plate2,counter5)",
+                lambda: robot.place("plate2", "counter5"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("counter5"), robot.holding("plate2")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(not hand_free() and unknown at(book3,cupboard4))",
+                    lambda: all_of(
+                        negated(robot.hand_free()),
+                        robot.at("book3", "cupboard4") is None,
                     ),
+                ),
+                Latch(
+                    "walk(shelf3)",
+                    lambda: robot.walk("shelf3"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("shelf3")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(not holding(book3) and known at(cup1,fridge2) and at(cup1,…",
+                    lambda: all_of(
+                        negated(robot.holding("book3")),
+                        robot.at("cup1", "fridge2") is not None,
+                        robot.at("cup1", "fridge2"),
+                        robot.is_open("cupboard4"),
+                    ),
+                ),
+                Latch(
+                    "walk(fridge2)",
+                    lambda: robot.walk("fridge2"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("fridge2")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(cup1,fridge2) and not at(cup1,fridge2) and near(f…",
+                    lambda: all_of(
+                        robot.at("cup1", "fridge2") is not None,
+                        negated(robot.at("cup1", "fridge2")),
+                        robot.near("fridge2"),
+                    ),
+                ),
+                Latch(
+                    "walk(shelf3)",
+                    lambda: robot.walk("shelf3"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("shelf3")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(open(drawer6) and holding(book3) and known at(cup1,shelf3)…",
+                    lambda: all_of(
+                        robot.is_open("drawer6"),
+                        robot.holding("book3"),
+                        robot.at("cup1", "shelf3") is not None,
+                        negated(robot.at("cup1", "shelf3")),
+                    ),
+                ),
+                Latch("walk(drawer6)", lambda: robot.walk("drawer6"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "place(book3,cupboard4)",
+                lambda: robot.place("book3", "cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    robot.holding("book3"),
+                    robot.is_open("cupboard4"),
+                ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(cup1,shelf3) and not at(cup1,shelf3) and not hand…",
+                    lambda: all_of(
+                        robot.at("cup1", "shelf3") is not None,
+                        negated(robot.at("cup1", "shelf3")),
+                        negated(robot.hand_free()),
+                        robot.is_open("cupboard4"),
+                    ),
+                ),
+                Latch(
+                    "walk(cupboard4)",
+                    lambda: robot.walk("cupboard4"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("cupboard4")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(not open(cupboard4) and hand_free())",
+                    lambda: all_of(negated(robot.is_open("cupboard4")), robot.hand_free()),
+                ),
+                Latch("walk(cupboard4)", lambda: robot.walk("cupboard4"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "pick(cup1,table1)",
+                lambda: robot.pick("cup1", "table1"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("table1"),
+                    robot.at("cup1", "table1"),
+                    robot.hand_free(),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "pick(cup1,fridge2)",
+                lambda: robot.pick("cup1", "fridge2"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("fridge2"),
+                    robot.at("cup1", "fridge2"),
+                    robot.hand_free(),
+                    robot.is_open("fridge2"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "pick(cup1,shelf3)",
+                lambda: robot.pick("cup1", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("shelf3"),
+                    robot.at("cup1", "shelf3"),
+                    robot.hand_free(),
+                ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(book3,shelf3) and at(book3,shelf3))",
+                    lambda: all_of(
+                        robot.at("book3", "shelf3") is not None,
+                        robot.at("book3", "shelf3"),
+                    ),
+                ),
+                Latch(
+                    "walk(shelf3)",
+                    lambda: robot.walk("shelf3"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("shelf3")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(cup1,table1) and at(cup1,table1) and hand_free() …",
+                    lambda: all_of(
+                        robot.at("cup1", "table1") is not None,
+                        robot.at("cup1", "table1"),
+                        robot.hand_free(),
+                        robot.is_open("fridge2"),
+                    ),
+                ),
+                Latch("walk(table1)", lambda: robot.walk("table1"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "place(cup1,shelf3)",
+                lambda: robot.place("cup1", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("shelf3"), robot.holding("cup1")),
+                keep=False,
+            ),
+            Latch(
+                "place(plate2,cupboard4)",
+                lambda: robot.place("plate2", "cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    robot.holding("plate2"),
+                    robot.is_open("cupboard4"),
+                ),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("not open(drawer6)", lambda: negated(robot.is_open("drawer6"))),
+                Latch(
+                    "place(book3,shelf3)",
+                    lambda: robot.place("book3", "shelf3"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.near("shelf3"), robot.holding("book3")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("near(table1)", lambda: robot.near("table1")),
+                Latch(
+                    "walk(fridge2)",
+                    lambda: robot.walk("fridge2"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("fridge2")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not open(drawer6)", lambda: negated(robot.is_open("drawer6"))),
+                Latch(
+                    "walk(drawer6)",
+                    lambda: robot.walk("drawer6"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("drawer6")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(book3,drawer6) and not at(book3,drawer6) and know…",
+                    lambda: all_of(
+                        robot.at("book3", "drawer6") is not None,
+                        negated(robot.at("book3", "drawer6")),
+                        robot.at("cup1", "shelf3") is not None,
+                        robot.at("cup1", "shelf3"),
+                    ),
+                ),
+                Latch(
+                    "walk(drawer6)",
+                    lambda: robot.walk("drawer6"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("drawer6")),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "place(book3,shelf3)",
+                lambda: robot.place("book3", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("shelf3"), robot.holding("book3")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(book3,drawer6) and not at(book3,drawer6))",
+                    lambda: all_of(
+                        robot.at("book3", "drawer6") is not None,
+                        negated(robot.at("book3", "drawer6")),
+                    ),
+                ),
+                Latch(
+                    "pick(book3,shelf3)",
+                    lambda: robot.pick("book3", "shelf3"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.near("shelf3"),
+                        robot.at("book3", "shelf3"),
+                        robot.hand_free(),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(book3,drawer6) and not at(book3,drawer6))",
+                    lambda: all_of(
+                        robot.at("book3", "drawer6") is not None,
+                        negated(robot.at("book3", "drawer6")),
+                    ),
+                ),
+                Latch(
+                    "pick(book3,counter5)",
+                    lambda: robot.pick("book3", "counter5"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.near("counter5"),
+                        robot.at("book3", "counter5"),
+                        robot.hand_free(),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(cup1,cupboard4) and at(cup1,cupboard4))",
+                    lambda: all_of(
+                        robot.at("cup1", "cupboard4") is not None,
+                        robot.at("cup1", "cupboard4"),
+                    ),
+                ),
+                Latch(
+                    "walk(cupboard4)",
+                    lambda: robot.walk("cupboard4"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("cupboard4")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(book3,drawer6) and not at(book3,drawer6))",
+                    lambda: all_of(
+                        robot.at("book3", "drawer6") is not None,
+                        negated(robot.at("book3", "drawer6")),
+                    ),
+                ),
+                Latch(
+                    "pick(book3,cupboard4)",
+                    lambda: robot.pick("book3", "cupboard4"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.near("cupboard4"),
+                        robot.at("book3", "cupboard4"),
+                        robot.hand_free(),
+                        robot.is_open("cupboard4"),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(book3,drawer6) and at(book3,drawer6))",
+                    lambda: all_of(
+                        robot.at("book3", "drawer6") is not None,
+                        robot.at("book3", "drawer6"),
+                    ),
+                ),
+                Latch(
+                    "walk(drawer6)",
+                    lambda: robot.walk("drawer6"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("drawer6")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("unknown at(book3,shelf3)", lambda: robot.at("book3", "shelf3") is None),
+                Latch("walk(shelf3)", lambda: robot.walk("shelf3"), robot.cancel, keep=False),
+            ),
+            Latch(
+                "walk(counter5)",
+                lambda: robot.walk("counter5"),
+                robot.cancel,
+                guard=lambda: negated(robot.near("counter5")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(known at(book3,cupboard4) and at(book3,cupboard4))",
+                    lambda: all_of(
+                        robot.at("book3", "cupboard4") is not None,
+                        robot.at("book3", "cupboard4"),
+                    ),
+                ),
+                Latch(
+                    "walk(cupboard4)",
+                    lambda: robot.walk("cupboard4"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("cupboard4")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "unknown at(book3,cupboard4)",
+                    lambda: robot.at("book3", "cupboard4") is None,
+                ),
+                Latch(
+                    "walk(cupboard4)",
+                    lambda: robot.walk("cupboard4"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("cupboard4")),
+                    keep=False,
                 ),
             ),
         ),
@@ -674,17 +975,22 @@ READS: dict[Fact, bool] = {
     ("at", "book3", "drawer6"): True,
     ("at", "book3", "shelf3"): True,
     ("at", "cup1", "cupboard4"): True,
+    ("at", "cup1", "fridge2"): True,
+    ("at", "cup1", "shelf3"): True,
     ("at", "cup1", "table1"): True,
     ("hand_free",): False,
     ("holding", "book3"): False,
     ("holding", "cup1"): False,
+    ("holding", "plate2"): False,
     ("near", "counter5"): False,
     ("near", "cupboard4"): False,
     ("near", "drawer6"): False,
+    ("near", "fridge2"): False,
     ("near", "shelf3"): False,
     ("near", "table1"): False,
     ("open", "cupboard4"): False,
     ("open", "drawer6"): False,
+    ("open", "fridge2"): False,
 }
 """The facts that the tree reads, and whether they can be unknown."""
 
@@ -698,10 +1004,17 @@ INITIAL: list[tuple[str, State]] = [
             ("at", "book3", "drawer6"): False,
             ("at", "book3", "shelf3"): None,
             ("at", "cup1", "cupboard4"): False,
+            ("at", "cup1", "fridge2"): False,
+            ("at", "cup1", "shelf3"): False,
             ("at", "cup1", "table1"): True,
+            ("at", "plate2", "counter5"): False,
+            ("at", "plate2", "cupboard4"): False,
+            ("at", "plate2", "fridge2"): True,
+            ("at", "plate2", "shelf3"): False,
             ("hand_free",): True,
             ("holding", "book3"): False,
             ("holding", "cup1"): False,
+            ("holding", "plate2"): False,
             ("near", "counter5"): False,
             ("near", "cupboard4"): False,
             ("near", "drawer6"): False,
@@ -710,6 +1023,7 @@ INITIAL: list[tuple[str, State]] = [
             ("near", "table1"): True,
             ("open", "cupboard4"): False,
             ("open", "drawer6"): False,
+            ("open", "fridge2"): False,
         },
     ),
 ]
@@ -776,6 +1090,28 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("1/10", {}),
         ],
     ],
+    ("pick", "cup1", "fridge2"): [
+        [
+            Outcome(
+                "9/10",
+                {
+                    ("at", "cup1", "fridge2"): False,
+                    ("hand_free",): False,
+                    ("holding", "cup1"): True,
+                },
+            ),
+            Outcome("1/10", {}),
+        ],
+    ],
+    ("pick", "cup1", "shelf3"): [
+        [
+            Outcome(
+                "9/10",
+                {("at", "cup1", "shelf3"): False, ("hand_free",): False, ("holding", "cup1"): True},
+            ),
+            Outcome("1/10", {}),
+        ],
+    ],
     ("pick", "cup1", "table1"): [
         [
             Outcome(
@@ -783,6 +1119,19 @@ ACTIONS: dict[Fact, list[Factor]] = {
                 {("at", "cup1", "table1"): False, ("hand_free",): False, ("holding", "cup1"): True},
             ),
             Outcome("1/10", {}),
+        ],
+    ],
+    ("place", "book3", "cupboard4"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "book3", "cupboard4"): True,
+                    ("hand_free",): True,
+                    ("holding", "book3"): False,
+                },
+            ),
+            Outcome("1/20", {}),
         ],
     ],
     ("place", "book3", "drawer6"): [
@@ -798,6 +1147,19 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome("1/20", {}),
         ],
     ],
+    ("place", "book3", "shelf3"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "book3", "shelf3"): True,
+                    ("hand_free",): True,
+                    ("holding", "book3"): False,
+                },
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
     ("place", "cup1", "cupboard4"): [
         [
             Outcome(
@@ -806,6 +1168,67 @@ ACTIONS: dict[Fact, list[Factor]] = {
                     ("at", "cup1", "cupboard4"): True,
                     ("hand_free",): True,
                     ("holding", "cup1"): False,
+                },
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("place", "cup1", "shelf3"): [
+        [
+            Outcome(
+                "19/20",
+                {("at", "cup1", "shelf3"): True, ("hand_free",): True, ("holding", "cup1"): False},
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("place", "plate2", "counter5"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "plate2", "counter5"): True,
+                    ("hand_free",): True,
+                    ("holding", "plate2"): False,
+                },
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("place", "plate2", "cupboard4"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "plate2", "cupboard4"): True,
+                    ("hand_free",): True,
+                    ("holding", "plate2"): False,
+                },
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("place", "plate2", "fridge2"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "plate2", "fridge2"): True,
+                    ("hand_free",): True,
+                    ("holding", "plate2"): False,
+                },
+            ),
+            Outcome("1/20", {}),
+        ],
+    ],
+    ("place", "plate2", "shelf3"): [
+        [
+            Outcome(
+                "19/20",
+                {
+                    ("at", "plate2", "shelf3"): True,
+                    ("hand_free",): True,
+                    ("holding", "plate2"): False,
                 },
             ),
             Outcome("1/20", {}),
@@ -852,6 +1275,22 @@ ACTIONS: dict[Fact, list[Factor]] = {
                     ("near", "cupboard4"): False,
                     ("near", "drawer6"): True,
                     ("near", "fridge2"): False,
+                    ("near", "shelf3"): False,
+                    ("near", "table1"): False,
+                },
+            ),
+            Outcome("1/50", {}),
+        ],
+    ],
+    ("walk", "fridge2"): [
+        [
+            Outcome(
+                "49/50",
+                {
+                    ("near", "counter5"): False,
+                    ("near", "cupboard4"): False,
+                    ("near", "drawer6"): False,
+                    ("near", "fridge2"): True,
                     ("near", "shelf3"): False,
                     ("near", "table1"): False,
                 },

@@ -309,59 +309,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.on("tray3"),
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(strapped(tray1) and strapped(tray2))",
-                    lambda: all_of(robot.strapped("tray1"), robot.strapped("tray2")),
-                ),
-                fallback(
-                    "fallback",
-                    sequence(
-                        "sequence",
-                        Condition("strapped(tray3)", lambda: robot.strapped("tray3")),
-                        Latch(
-                            "push(ward)",
-                            lambda: robot.push("ward"),
-                            robot.cancel,
-                            guard=lambda: negated(robot.trolley_at("ward")),
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
-                        "strap(tray3)",
-                        lambda: robot.strap("tray3"),
-                        robot.cancel,
-                        guard=lambda: robot.on("tray3"),
-                        keep=False,
-                    ),
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("strapped(tray1)", lambda: robot.strapped("tray1")),
-                Latch(
-                    "strap(tray2)",
-                    lambda: robot.strap("tray2"),
-                    robot.cancel,
-                    guard=lambda: robot.on("tray2"),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(on(tray2) and on(tray3))",
-                    lambda: all_of(robot.on("tray2"), robot.on("tray3")),
-                ),
-                Latch(
-                    "strap(tray1)",
-                    lambda: robot.strap("tray1"),
-                    robot.cancel,
-                    guard=lambda: robot.on("tray1"),
-                    keep=False,
-                ),
-            ),
             Latch(
                 "put_back(tray1)",
                 lambda: robot.put_back("tray1"),
@@ -381,6 +328,74 @@ def create_root(robot: Robot) -> Behaviour:
                 lambda: robot.put_back("tray3"),
                 robot.cancel,
                 guard=lambda: all_of(negated(robot.on("tray3")), negated(robot.spilled("tray3"))),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("not strapped(tray1)", lambda: negated(robot.strapped("tray1"))),
+                Latch(
+                    "strap(tray1)",
+                    lambda: robot.strap("tray1"),
+                    robot.cancel,
+                    guard=lambda: robot.on("tray1"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("not strapped(tray2)", lambda: negated(robot.strapped("tray2"))),
+                Latch(
+                    "strap(tray2)",
+                    lambda: robot.strap("tray2"),
+                    robot.cancel,
+                    guard=lambda: robot.on("tray2"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("strapped(tray3)", lambda: robot.strapped("tray3")),
+                Latch(
+                    "push(ward)",
+                    lambda: robot.push("ward"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.trolley_at("ward")),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "strap(tray3)",
+                lambda: robot.strap("tray3"),
+                robot.cancel,
+                guard=lambda: robot.on("tray3"),
+                keep=False,
+            ),
+            Latch(
+                "push(ward)",
+                lambda: robot.push("ward"),
+                robot.cancel,
+                guard=lambda: negated(robot.trolley_at("ward")),
+                keep=False,
+            ),
+            Latch(
+                "strap(tray1)",
+                lambda: robot.strap("tray1"),
+                robot.cancel,
+                guard=lambda: robot.on("tray1"),
+                keep=False,
+            ),
+            Latch(
+                "strap(tray2)",
+                lambda: robot.strap("tray2"),
+                robot.cancel,
+                guard=lambda: robot.on("tray2"),
+                keep=False,
+            ),
+            Latch(
+                "push(kitchen)",
+                lambda: robot.push("kitchen"),
+                robot.cancel,
+                guard=lambda: negated(robot.trolley_at("kitchen")),
                 keep=False,
             ),
         ),
@@ -500,6 +515,7 @@ READS: dict[Fact, bool] = {
     ("strapped", "tray1"): False,
     ("strapped", "tray2"): False,
     ("strapped", "tray3"): False,
+    ("trolley_at", "kitchen"): False,
     ("trolley_at", "ward"): False,
 }
 """The facts that the tree reads, and whether they can be unknown."""
@@ -527,6 +543,66 @@ INITIAL: list[tuple[str, State]] = [
 
 
 ACTIONS: dict[Fact, list[Factor]] = {
+    ("push", "kitchen"): [
+        [Outcome("1", {("trolley_at", "kitchen"): True, ("trolley_at", "ward"): False})],
+        [
+            Outcome(
+                "1/40",
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray1")], negated(s[("strapped", "tray1")])),
+                    {("on", "tray1"): False, ("spilled", "tray1"): True},
+                ),
+            ),
+            Outcome(
+                "3/40",
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray1")], negated(s[("strapped", "tray1")])),
+                    {("on", "tray1"): False},
+                ),
+            ),
+            Outcome("9/10", {}),
+        ],
+        [
+            Outcome(
+                "1/40",
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray2")], negated(s[("strapped", "tray2")])),
+                    {("on", "tray2"): False, ("spilled", "tray2"): True},
+                ),
+            ),
+            Outcome(
+                "3/40",
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray2")], negated(s[("strapped", "tray2")])),
+                    {("on", "tray2"): False},
+                ),
+            ),
+            Outcome("9/10", {}),
+        ],
+        [
+            Outcome(
+                "1/40",
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray3")], negated(s[("strapped", "tray3")])),
+                    {("on", "tray3"): False, ("spilled", "tray3"): True},
+                ),
+            ),
+            Outcome(
+                "3/40",
+                {},
+                When(
+                    lambda s: all_of(s[("on", "tray3")], negated(s[("strapped", "tray3")])),
+                    {("on", "tray3"): False},
+                ),
+            ),
+            Outcome("9/10", {}),
+        ],
+    ],
     ("push", "ward"): [
         [Outcome("1", {("trolley_at", "kitchen"): False, ("trolley_at", "ward"): True})],
         [

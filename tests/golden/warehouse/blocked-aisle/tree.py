@@ -22,7 +22,7 @@ from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
+from py_trees.composites import Selector
 from py_trees.decorators import Decorator
 from py_trees.trees import BehaviourTree
 
@@ -191,11 +191,6 @@ class Latch(Decorator):
         self._final = status if self._keep else None
 
 
-def sequence(name: str, *children: Behaviour) -> Behaviour:
-    """Goes on while children succeed. Every tick starts at the first child."""
-    return Sequence(name, memory=False, children=list(children))
-
-
 def fallback(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children fail. Every tick starts at the first child."""
     return Selector(name, memory=False, children=list(children))
@@ -321,47 +316,6 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: all_of(robot.loaded("saw"), robot.at("packing")),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("loaded(saw)", lambda: robot.loaded("saw")),
-                Latch(
-                    "drive(packing)",
-                    lambda: robot.drive("packing"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.at("packing")),
-                        any_of(
-                            robot.at("packing"),
-                            all_of(
-                                any_of(
-                                    robot.at("b1"),
-                                    all_of(
-                                        robot.at("packing"),
-                                        negated(robot.blocked("packing", "b1")),
-                                        negated(robot.blocked("b1", "packing")),
-                                    ),
-                                ),
-                                negated(robot.blocked("b1", "packing")),
-                                negated(robot.blocked("packing", "b1")),
-                            ),
-                        ),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(at(b1) and known stored(saw,b1) and stored(saw,b1) and not…",
-                    lambda: all_of(
-                        robot.at("b1"),
-                        robot.stored("saw", "b1") is not None,
-                        robot.stored("saw", "b1"),
-                        negated(robot.loaded("saw")),
-                    ),
-                ),
-                Latch("fetch(saw,b1)", lambda: robot.fetch("saw", "b1"), robot.cancel, keep=False),
-            ),
             Latch(
                 "drive(b1)",
                 lambda: robot.drive("b1"),
@@ -374,6 +328,41 @@ def create_root(robot: Robot) -> Behaviour:
                             robot.at("packing"),
                             negated(robot.blocked("packing", "b1")),
                             negated(robot.blocked("b1", "packing")),
+                        ),
+                    ),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "fetch(saw,b1)",
+                lambda: robot.fetch("saw", "b1"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("b1"),
+                    robot.stored("saw", "b1"),
+                    negated(robot.loaded("saw")),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(packing)",
+                lambda: robot.drive("packing"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    negated(robot.at("packing")),
+                    any_of(
+                        robot.at("packing"),
+                        all_of(
+                            any_of(
+                                robot.at("b1"),
+                                all_of(
+                                    robot.at("packing"),
+                                    negated(robot.blocked("packing", "b1")),
+                                    negated(robot.blocked("b1", "packing")),
+                                ),
+                            ),
+                            negated(robot.blocked("b1", "packing")),
+                            negated(robot.blocked("packing", "b1")),
                         ),
                     ),
                 ),

@@ -314,123 +314,146 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("delivered(drill)", lambda: robot.delivered("drill")),
+            Latch(
+                "hand_in(drill,packing)",
+                lambda: robot.hand_in("drill", "packing"),
+                robot.cancel,
+                guard=lambda: all_of(robot.loaded("drill"), robot.at("packing")),
+                keep=False,
+            ),
+            Latch(
+                "scan(drill,a1)",
+                lambda: robot.scan("drill", "a1"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("a1"), robot.stored("drill", "a1") is None),
+                keep=False,
+            ),
+            Latch(
+                "fetch(drill,a1)",
+                lambda: robot.fetch("drill", "a1"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("a1"),
+                    robot.stored("drill", "a1"),
+                    negated(robot.loaded("drill")),
+                ),
+                keep=False,
+            ),
             sequence(
                 "sequence",
                 Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                fallback(
-                    "fallback",
-                    sequence(
-                        "sequence",
-                        Condition("not at(packing)", lambda: negated(robot.at("packing"))),
-                        Latch(
-                            "drive(packing)",
-                            lambda: robot.drive("packing"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                negated(robot.at("packing")),
+                Latch(
+                    "drive(packing)",
+                    lambda: robot.drive("packing"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.at("packing")),
+                        any_of(
+                            robot.at("packing"),
+                            all_of(
                                 any_of(
-                                    robot.at("packing"),
+                                    robot.at("a1"),
                                     all_of(
-                                        any_of(
-                                            robot.at("a1"),
-                                            all_of(
-                                                robot.at("packing"),
-                                                negated(robot.blocked("packing", "a1")),
-                                                negated(robot.blocked("a1", "packing")),
-                                            ),
-                                            all_of(
-                                                robot.at("a2"),
-                                                negated(robot.blocked("a2", "a1")),
-                                                negated(robot.blocked("a1", "a2")),
-                                            ),
-                                        ),
-                                        negated(robot.blocked("a1", "packing")),
+                                        robot.at("packing"),
                                         negated(robot.blocked("packing", "a1")),
+                                        negated(robot.blocked("a1", "packing")),
+                                    ),
+                                    all_of(
+                                        robot.at("a2"),
+                                        negated(robot.blocked("a2", "a1")),
+                                        negated(robot.blocked("a1", "a2")),
                                     ),
                                 ),
+                                negated(robot.blocked("a1", "packing")),
+                                negated(robot.blocked("packing", "a1")),
                             ),
-                            keep=False,
                         ),
                     ),
-                    Latch(
-                        "hand_in(drill,packing)",
-                        lambda: robot.hand_in("drill", "packing"),
-                        robot.cancel,
-                        guard=lambda: all_of(robot.loaded("drill"), robot.at("packing")),
-                        keep=False,
-                    ),
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(a1)", lambda: robot.at("a1")),
-                Condition(
-                    "known stored(drill,a1)",
-                    lambda: robot.stored("drill", "a1") is not None,
-                ),
-                Condition("stored(drill,a1)", lambda: robot.stored("drill", "a1")),
-                Latch(
-                    "fetch(drill,a1)",
-                    lambda: robot.fetch("drill", "a1"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("a1"),
-                        robot.stored("drill", "a1"),
-                        negated(robot.loaded("drill")),
-                    ),
                     keep=False,
                 ),
             ),
             sequence(
                 "sequence",
-                Condition("at(a2)", lambda: robot.at("a2")),
-                Condition(
-                    "known stored(drill,a2)",
-                    lambda: robot.stored("drill", "a2") is not None,
-                ),
-                Condition("stored(drill,a2)", lambda: robot.stored("drill", "a2")),
+                Condition("at(packing)", lambda: robot.at("packing")),
                 Latch(
-                    "fetch(drill,a2)",
-                    lambda: robot.fetch("drill", "a2"),
+                    "drive(a1)",
+                    lambda: robot.drive("a1"),
                     robot.cancel,
                     guard=lambda: all_of(
+                        negated(robot.at("a1")),
+                        any_of(
+                            robot.at("a1"),
+                            all_of(
+                                robot.at("packing"),
+                                negated(robot.blocked("packing", "a1")),
+                                negated(robot.blocked("a1", "packing")),
+                            ),
+                            all_of(
+                                robot.at("a2"),
+                                negated(robot.blocked("a2", "a1")),
+                                negated(robot.blocked("a1", "a2")),
+                            ),
+                        ),
+                    ),
+                    keep=False,
+                ),
+            ),
+            Latch(
+                "scan(drill,a2)",
+                lambda: robot.scan("drill", "a2"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("a2"), robot.stored("drill", "a2") is None),
+                keep=False,
+            ),
+            Latch(
+                "fetch(drill,a2)",
+                lambda: robot.fetch("drill", "a2"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("a2"),
+                    robot.stored("drill", "a2"),
+                    negated(robot.loaded("drill")),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(a2)",
+                lambda: robot.drive("a2"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    negated(robot.at("a2")),
+                    any_of(
                         robot.at("a2"),
-                        robot.stored("drill", "a2"),
-                        negated(robot.loaded("drill")),
+                        all_of(
+                            any_of(
+                                robot.at("a1"),
+                                all_of(
+                                    robot.at("packing"),
+                                    negated(robot.blocked("packing", "a1")),
+                                    negated(robot.blocked("a1", "packing")),
+                                ),
+                                all_of(
+                                    robot.at("a2"),
+                                    negated(robot.blocked("a2", "a1")),
+                                    negated(robot.blocked("a1", "a2")),
+                                ),
+                            ),
+                            negated(robot.blocked("a1", "a2")),
+                            negated(robot.blocked("a2", "a1")),
+                        ),
                     ),
-                    keep=False,
                 ),
+                keep=False,
             ),
             sequence(
                 "sequence",
-                Condition("at(a1)", lambda: robot.at("a1")),
-                Condition("unknown stored(drill,a1)", lambda: robot.stored("drill", "a1") is None),
-                Latch(
-                    "scan(drill,a1)",
-                    lambda: robot.scan("drill", "a1"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(a2)", lambda: robot.at("a2")),
-                Condition("unknown stored(drill,a2)", lambda: robot.stored("drill", "a2") is None),
-                Latch(
-                    "scan(drill,a2)",
-                    lambda: robot.scan("drill", "a2"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("unknown stored(drill,a1)", lambda: robot.stored("drill", "a1") is None),
                 Condition(
-                    "known stored(drill,a2)",
-                    lambda: robot.stored("drill", "a2") is not None,
+                    "(known stored(drill,a1) and stored(drill,a1))",
+                    lambda: all_of(
+                        robot.stored("drill", "a1") is not None,
+                        robot.stored("drill", "a1"),
+                    ),
                 ),
-                Condition("not stored(drill,a2)", lambda: negated(robot.stored("drill", "a2"))),
                 Latch(
                     "drive(a1)",
                     lambda: robot.drive("a1"),
@@ -456,32 +479,41 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                fallback(
-                    "fallback",
-                    Condition(
-                        "unknown stored(drill,a1)",
-                        lambda: robot.stored("drill", "a1") is None,
-                    ),
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "unknown stored(drill,a2)",
-                            lambda: robot.stored("drill", "a2") is None,
-                        ),
-                        Condition(
-                            "not stored(drill,a1)",
-                            lambda: negated(robot.stored("drill", "a1")),
-                        ),
-                    ),
-                ),
+                Condition("unknown stored(drill,a1)", lambda: robot.stored("drill", "a1") is None),
                 Latch(
-                    "drive(a2)",
-                    lambda: robot.drive("a2"),
+                    "drive(a1)",
+                    lambda: robot.drive("a1"),
                     robot.cancel,
                     guard=lambda: all_of(
-                        negated(robot.at("a2")),
+                        negated(robot.at("a1")),
                         any_of(
-                            robot.at("a2"),
+                            robot.at("a1"),
+                            all_of(
+                                robot.at("packing"),
+                                negated(robot.blocked("packing", "a1")),
+                                negated(robot.blocked("a1", "packing")),
+                            ),
+                            all_of(
+                                robot.at("a2"),
+                                negated(robot.blocked("a2", "a1")),
+                                negated(robot.blocked("a1", "a2")),
+                            ),
+                        ),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("at(a1)", lambda: robot.at("a1")),
+                Latch(
+                    "drive(packing)",
+                    lambda: robot.drive("packing"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.at("packing")),
+                        any_of(
+                            robot.at("packing"),
                             all_of(
                                 any_of(
                                     robot.at("a1"),
@@ -496,8 +528,8 @@ def create_root(robot: Robot) -> Behaviour:
                                         negated(robot.blocked("a1", "a2")),
                                     ),
                                 ),
-                                negated(robot.blocked("a1", "a2")),
-                                negated(robot.blocked("a2", "a1")),
+                                negated(robot.blocked("a1", "packing")),
+                                negated(robot.blocked("packing", "a1")),
                             ),
                         ),
                     ),
@@ -506,7 +538,33 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition("at(packing)", lambda: robot.at("packing")),
+                Condition("blocked(a1,packing)", lambda: robot.blocked("a1", "packing")),
+                Latch(
+                    "drive(a1)",
+                    lambda: robot.drive("a1"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.at("a1")),
+                        any_of(
+                            robot.at("a1"),
+                            all_of(
+                                robot.at("packing"),
+                                negated(robot.blocked("packing", "a1")),
+                                negated(robot.blocked("a1", "packing")),
+                            ),
+                            all_of(
+                                robot.at("a2"),
+                                negated(robot.blocked("a2", "a1")),
+                                negated(robot.blocked("a1", "a2")),
+                            ),
+                        ),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("blocked(packing,a1)", lambda: robot.blocked("packing", "a1")),
                 Latch(
                     "drive(a1)",
                     lambda: robot.drive("a1"),
