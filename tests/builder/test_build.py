@@ -515,21 +515,26 @@ def wait_until(holds: Callable[[], bool], seconds: float = 60) -> None:
         time.sleep(0.05)
 
 
-SLOW = """(define (domain slow)
-  (:predicates (at ?x) (goal) (next ?x ?y))
-  (:action step :parameters (?x ?y) :precondition (and (at ?x) (next ?x ?y))
-    :effect (probabilistic 1/2 (and (at ?y) (not (at ?x)))))
-  (:action jump :parameters (?x) :precondition (at ?x) :effect (probabilistic 1/100 (goal))))
-"""
+COINS = range(60)
+SLOW = (
+    f"(define (domain slow) (:predicates {' '.join(f'(heads{i}) (tails{i})' for i in COINS)})"
+    + "".join(
+        f"(:action toss{i} :precondition (not (or (heads{i}) (tails{i})))"
+        f" :effect (probabilistic 1/2 (heads{i}) 1/2 (tails{i})))"
+        for i in COINS
+    )
+    + ")"
+)
+"""How each coin fell is remembered: every policy leads to more states than can be explored."""
 
 
 def slow_project(folder: Path) -> Path:
     """A project with a quick tree, and one that takes for ever."""
-    facts = "(:objects a b) (:init (at a) (next a b) (next b a))"
-    problem = f"(define (problem long) (:domain slow) {facts} (:goal (goal)))"
+    goal = " ".join(f"(or (heads{i}) (tails{i}))" for i in COINS)
+    problem = f"(define (problem long) (:domain slow) (:init) (:goal (and {goal})))"
     manifest = (
         "trees:\n  quick: {domain: coin.pddl, target: 0.5}\n"
-        "  slow: {domain: slow.pddl, problem: long.pddl, target: 0.999999}\n"
+        "  slow: {domain: slow.pddl, problem: long.pddl, strategy: policy}\n"
     )
     return project(folder, manifest, coin_pddl=COIN, slow_pddl=SLOW, long_pddl=problem)
 

@@ -221,7 +221,10 @@ class _Search:
 
     def _solve(self, limits: Limits | None = None) -> _Solved:
         limits = limits or self.limits
-        space = self.explorer.space(~self.closed, None)
+        # A limit or the user may have ended the look at what was found last: that is open.
+        fringe = ~self.explorer.goal()
+        fringe[: len(self.closed)] &= ~self.closed
+        space = self.explorer.space(fringe, None)
         graph = Graph(space)
         lower = max_prob(space, limits, graph=graph, rationals=False)
         hope = space.goal | space.fringe

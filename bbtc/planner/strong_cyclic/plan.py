@@ -19,7 +19,6 @@ from bbtc.planner.result import Plan, Progress
 from bbtc.planner.strong_cyclic.quotient import quotient_chain
 from bbtc.planner.strong_cyclic.rules import Rule, Rules, tree_of
 from bbtc.planner.strong_cyclic.solve import Hopeless, Solved, Solver
-from bbtc.planner.synthesis.policy import plan_policy
 from bbtc.rewrite.simplify import numbered, size
 from bbtc.tree.nodes import ConditionNode, Node, PlanStatus
 
@@ -66,6 +65,8 @@ def plan_strong_cyclic(
         plan = best.plan(status)
         bounds = (plan.figures.success, Fraction(1))
         return replace(plan, tree=replace(plan.tree, bounds=bounds))
+    from bbtc.planner.synthesis.policy import plan_policy
+
     advice = None if solver is None else _Advice(solver)
     plan = plan_policy(task, target, limits, progress, replace(options, best=best), advice=advice)
     if status == "out-of-reach" and plan.tree.status == "limit-reached":
