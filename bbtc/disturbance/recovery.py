@@ -21,7 +21,6 @@ from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import FailureFinder
 from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
-from bbtc.diagnostics import LimitReached
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.intervals import Interval, score, wilson
 from bbtc.ground.condition import FALSE, Condition, compile_condition, conjunction, conjuncts, evaluate
@@ -111,9 +110,7 @@ def recovery(
     if samples is not None and samples < 1:
         raise ValueError("there must be at least one sample")
     space = explore_space(replace(task, goal=FALSE), limits)  # so that the goal ends nothing
-    if not space.complete:
-        assert space.stop is not None
-        raise LimitReached([space.stop])
+    space.require_complete()
     best = max_prob(space, limits, holds(space.packing, bit_test(space.packing, task.goal), space.states))
     rows = _taken(len(space.states), samples, seed)
     hopeful = [row for row in rows if best.bounds(row).upper]

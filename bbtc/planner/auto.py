@@ -172,10 +172,10 @@ class _Auto:
         if self.elsewhere is None:
             return Fraction(0)
         if id(plan) not in self._recovery:
-            self._recovery[id(plan)] = self._recovers(plan, self.elsewhere)
+            self._recovery[id(plan)] = self._success_from(self.elsewhere, plan)
         return self._recovery[id(plan)]
 
-    def _recovers(self, plan: Plan, elsewhere: Task) -> Fraction:
+    def _success_from(self, elsewhere: Task, plan: Plan) -> Fraction:
         few = replace(self.limits, states=min(self.limits.states, _REFINE_STATES))
         try:
             return success_of(explore(elsewhere, plan.tree.root, few))

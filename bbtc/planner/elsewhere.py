@@ -27,16 +27,14 @@ _SHARE = Fraction(1, 1000)
 _LOOK = 100  # states between two looks at the clock
 
 
-def starts_elsewhere(
-    task: Task, limits: Limits, visited: Iterable[Values] = (), most: int = MOST_STARTS
-) -> list[tuple[Truth, ...]]:
-    """Initial states that the task does not have, ``most`` of them: what one change makes of its own, and of
-    those visited. Raises ``LimitReached``."""
+def starts_elsewhere(task: Task, limits: Limits, visited: Iterable[Values] = ()) -> list[tuple[Truth, ...]]:
+    """Initial states that the task does not have, :data:`MOST_STARTS` of them at most: what one change makes
+    of its own, and of those visited. Raises ``LimitReached``."""
     facts = ChangingFacts.of(task, limits)
     own = initial_belief(task)
     states = spread([*dict.fromkeys([*own, *visited])], MOST_VISITED)
     found = [values for values in changed(facts, states, limits) if values not in own]
-    return [tuple(map(Truth, values)) for values in spread(found, most)]
+    return [tuple(map(Truth, values)) for values in spread(found, MOST_STARTS)]
 
 
 def changed(facts: ChangingFacts, states: Iterable[Values], limits: Limits) -> list[Values]:

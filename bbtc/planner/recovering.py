@@ -31,7 +31,7 @@ from bbtc.limits import Limits
 from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.planner.elsewhere import MOST_VISITED, also_at, changed, spread
 from bbtc.planner.mdp.explore import explore_space
-from bbtc.planner.mdp.graph import Floats, draw_probabilities, sums
+from bbtc.planner.mdp.graph import draw_probabilities, sums
 from bbtc.planner.mdp.maxprob import MaxProb, max_prob
 from bbtc.planner.mdp.packing import Flags, bit_test, holds
 from bbtc.planner.mdp.ssp import least_cost
@@ -39,7 +39,7 @@ from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.planner.mdp.transitions import Index
 from bbtc.planner.strong_cyclic.rules import certainly
 from bbtc.planner.strong_cyclic.sharing import Guarded, factored
-from bbtc.planner.synthesis.rules import Literal, literals_of, separating, stated
+from bbtc.planner.synthesis.rules import Literal, Stated, literals_of, rule_size, separating
 from bbtc.rewrite.simplify import numbered
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
@@ -113,8 +113,7 @@ def _wide_space(task: Task, limits: Limits) -> StateSpace:
 
 def _whole(task: Task, limits: Limits) -> StateSpace:
     space = explore_space(task, limits)
-    if space.stop is not None:
-        raise LimitReached([space.stop])
+    space.require_complete()
     return space
 
 
@@ -172,6 +171,7 @@ class _Learner:
         self.hopeful = ~found.prob_0 & ~space.goal
         values = space.packing.unpack(space.states)
         self.literals = literals_of(values)
+        self.stated = Stated(task, self.literals)
         columns = [literal.holds(values) for literal in self.literals]
         self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(values), len(columns))
         self.given_up = np.zeros(len(space.choice_action), dtype=np.bool_)
@@ -254,9 +254,9 @@ class _Learner:
             at_best = (-len(wanted) / 3, 1) if len(others) else (-float(len(wanted)), 0)
             if best is not None and best[0] <= at_best:
                 continue
-            tests = separating(self.holds[wanted], self.holds[others], self._own(action))
+            tests = separating(self.holds[wanted], self.holds[others], self.stated.by(action))
             covered = wanted[self.holds[wanted][:, tests].all(axis=1)]
-            key = (-len(covered) / _size(tests), len(tests))
+            key = (-len(covered) / rule_size(tests), len(tests))
             if best is None or key < best[0]:
                 best = key, _Rule(tuple(tests), action), covered
         return None if best is None else best[1:]
@@ -285,25 +285,15 @@ class _Learner:
             if not wanted.any():
                 continue
             others = self.holds[stuck & self._may_start(action)]
-            tests = separating(self.holds[wanted], others, self._own(action))
+            tests = separating(self.holds[wanted], others, self.stated.by(action))
             covered = wanted & self.holds[:, tests].all(axis=1)
-            key = -int(covered.sum()) / _size(tests)
+            key = -int(covered.sum()) / rule_size(tests)
             if best is None or key < best[0]:
                 best = key, _Rule(tuple(tests), action), covered
         return None if best is None else best[1:]
 
-    def _own(self, action: int) -> Floats:
-        """1 for literals that the action's precondition states: they read best."""
-        own = frozenset(stated(self.task.actions[action].precondition))
-        return np.array([float(literal in own) for literal in self.literals])
-
     def _stated(self, rule: _Rule) -> tuple[tuple[Literal, ...], int]:
         return tuple(self.literals[test] for test in rule.tests), rule.action
-
-
-def _size(tests: list[int]) -> int:
-    """The nodes of a rule."""
-    return len(tests) + 2 if tests else 1
 
 
 def _tree(task: Task, rules: list[tuple[tuple[Literal, ...], int]]) -> Node:

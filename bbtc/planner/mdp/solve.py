@@ -64,8 +64,7 @@ def best_known(
         found = max_prob(space, limits)
         return Best(found, found.initial)
     if whole:
-        assert space.stop is not None
-        raise LimitReached([space.stop])
+        space.require_complete()
     del space  # two of them may be too much
     searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
     return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.diagnostics import Diagnostic
+from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.planner.mdp.packing import Flags, Packing, Words
 from bbtc.planner.mdp.transitions import Draw, Index
@@ -99,6 +99,11 @@ class StateSpace(Branching):
     def complete(self) -> bool:
         """Was everything reachable found?"""
         return not self.fringe.any()
+
+    def require_complete(self) -> None:
+        """Raises ``LimitReached`` for the limit that left a part of it out, if one did."""
+        if self.stop is not None:
+            raise LimitReached([self.stop])
 
     @property
     def start(self) -> Index:

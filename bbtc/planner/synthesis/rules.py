@@ -7,6 +7,7 @@ forgotten, so later rules need to tell fewer states apart.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -85,7 +86,7 @@ class Learner:
         columns = [literal.holds(policy.values) for literal in self.literals]
         self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(policy.goal), len(self.literals))
         self.taken = np.ones(len(policy.choice_action), dtype=np.bool_)
-        self._own: dict[int, npt.NDArray[np.float64]] = {}
+        self.stated = Stated(task, self.literals)
 
     def relevant(self) -> Flags:
         """The states that runs may still visit."""
@@ -130,8 +131,7 @@ class Learner:
             if best is not None and best[0] <= at_best:
                 continue
             columns, covered = self._grow(action, wanted, others)
-            size = len(columns) + 2 if columns else 1
-            key = (-len(covered) / size, len(columns))
+            key = (-len(covered) / rule_size(columns), len(columns))
             if best is None or key < best[0]:
                 best = key, columns, action, covered
         assert best is not None
@@ -140,16 +140,29 @@ class Learner:
 
     def _grow(self, action: int, wanted: Index, others: Index) -> tuple[tuple[int, ...], Index]:
         """A conjunction that holds in some of the wanted states and in none of the others."""
-        chosen = separating(self.holds[wanted], self.holds[others], self._own_literals(action))
+        chosen = separating(self.holds[wanted], self.holds[others], self.stated.by(action))
         covered = wanted[self.holds[wanted][:, chosen].all(axis=1)]
         return tuple(chosen), covered
 
-    def _own_literals(self, action: int) -> npt.NDArray[np.float64]:
-        """1 for literals that the action's precondition states: they read best."""
-        if action not in self._own:
-            own = frozenset(stated(self.task.actions[action].precondition))
-            self._own[action] = np.array([float(literal in own) for literal in self.literals])
-        return self._own[action]
+
+class Stated:
+    """Which literals the actions' preconditions state: they read best."""
+
+    def __init__(self, task: Task, literals: Sequence[Literal]) -> None:
+        self.task, self.literals = task, literals
+        self._known: dict[int, npt.NDArray[np.float64]] = {}
+
+    def by(self, action: int) -> npt.NDArray[np.float64]:
+        """For each literal 1 if an action's precondition states it, else 0."""
+        if action not in self._known:
+            own = frozenset(_stated(self.task.actions[action].precondition))
+            self._known[action] = np.array([float(literal in own) for literal in self.literals])
+        return self._known[action]
+
+
+def rule_size(tests: Sequence[int]) -> int:
+    """The nodes of a rule with so many tests."""
+    return len(tests) + 2 if tests else 1
 
 
 def separating(wanted: Flags, others: Flags, own: npt.NDArray[np.float64]) -> list[int]:
@@ -190,8 +203,7 @@ def literals_of(values: npt.NDArray[np.uint8]) -> list[Literal]:
     return sorted(found.values())
 
 
-def stated(condition: Condition) -> list[Literal]:
-    """The literals of a condition."""
+def _stated(condition: Condition) -> list[Literal]:
     tests = {Truth.TRUE: Test.TRUE, Truth.FALSE: Test.FALSE, Truth.UNKNOWN: Test.UNKNOWN}
     return [
         Literal(leaf.variable, tests[leaf.value] if isinstance(leaf, Is) else Test.KNOWN)
