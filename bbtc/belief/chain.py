@@ -63,7 +63,7 @@ def explore(
     steps = []
     for node in actions:
         if node.action not in transitions:
-            transitions[node.action] = compile_action(task.action_by_name[node.action], limits)
+            transitions[node.action] = compile_action(task, task.action_by_name[node.action], limits)
         steps.append(transitions[node.action])
     tick = compile_tick(task, root)
     on_start = memory_of(root).started

@@ -13,7 +13,10 @@ from bbtc.limits import Limits
 from bbtc.markov import distribution
 
 Values: TypeAlias = bytes
-"""The truth value of every variable of the task, by index."""
+"""The truth value of every variable of the task, by index; behind them, of each component of hidden facts,
+the number of what is believed of it (:mod:`bbtc.belief.hidden`), in :data:`PLACES` bytes."""
+
+PLACES = 4
 
 
 class State(NamedTuple):
@@ -40,11 +43,24 @@ Transition: TypeAlias = Callable[[Values], tuple[Result, ...]]
 
 def initial_belief(task: Task) -> dict[Values, Fraction]:
     """The task's initial distribution over assignments, equal ones merged."""
-    return distribution((bytes(initial.values), initial.probability) for initial in task.initial)
+    own = distribution((bytes(initial.values), initial.probability) for initial in task.initial)
+    if not task.components:
+        return own
+    from bbtc.belief.hidden import told_first
+
+    return distribution(
+        (after, probability * p)
+        for values, p in own.items()
+        for after, probability in told_first(task, values)
+    )
 
 
-_Delta: TypeAlias = tuple[tuple[int, int], ...]
-_Draw: TypeAlias = tuple[_Delta, Fraction, Fraction]  # sets, cost, reward
+Delta: TypeAlias = tuple[tuple[int, int], ...]
+"""Places in the values, and what they are set to, ordered by place."""
+Draw: TypeAlias = tuple[Delta, Fraction, Fraction]
+"""What is set, what is added to the cost, and the reward."""
+Spend: TypeAlias = Callable[[int, int], None]
+"""Told how many combinations were formed, and how many of them differ; ends it at a limit."""
 
 
 _LOOK = 4096  # combinations of outcomes between two looks at the clock
@@ -67,25 +83,29 @@ class _Bounded:
             self._limits.check_time("working out what an action leads to")
 
 
-def compile_action(action: GroundAction, limits: Limits) -> Transition:
-    """The action as a function from values to its results: equal results merged, most probable
+def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transition:
+    """An action of the task as a function from values to its results: equal results merged, most probable
     first (ties by values). Results are cached per assignment. The function raises
     :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on states, or
     for longer than time and memory allow."""
     bounded = _Bounded(limits)
-    drawers = [_compile_factor(factor, bounded) for factor in action.factors]
+    drawers = [compile_factor(factor, bounded.spend) for factor in action.factors]
+    if action.changes:
+        from bbtc.belief.hidden import compile_change
+
+        drawers += [compile_change(task, change, bounded.spend) for change in action.changes]
     cache: dict[Values, tuple[Result, ...]] = {}
 
     def results(values: Values) -> tuple[Result, ...]:
         known = cache.get(values)
         if known is None:
-            known = cache[values] = _results(values, action.cost, _product(values, drawers, bounded))
+            known = cache[values] = _results(values, action.cost, product_of(values, drawers, bounded.spend))
         return known
 
     return results
 
 
-def _results(values: Values, cost: Fraction, draws: dict[_Draw, Fraction]) -> tuple[Result, ...]:
+def _results(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> tuple[Result, ...]:
     merged: dict[tuple[Values, Fraction, Fraction], Fraction] = {}
     for (delta, extra, reward), probability in draws.items():
         if not probability:
@@ -99,27 +119,27 @@ def _results(values: Values, cost: Fraction, draws: dict[_Draw, Fraction]) -> tu
     return tuple(sorted(results, key=lambda r: (-r.probability, r.values, r.cost, r.reward)))
 
 
-_Drawer: TypeAlias = Callable[[Values], dict[_Draw, Fraction]]
+Drawer: TypeAlias = Callable[[Values], dict[Draw, Fraction]]
 _Amounts: TypeAlias = Callable[[Values], tuple[Fraction, Fraction]]  # cost, reward
 
 
-def _product(values: Values, drawers: Iterable[_Drawer], bounded: _Bounded) -> dict[_Draw, Fraction]:
+def product_of(values: Values, drawers: Iterable[Drawer], spend: Spend) -> dict[Draw, Fraction]:
     """Independent draws combined: sets united (the Kleene maximum where they clash), costs and
     rewards added, equal combinations merged at once so that only distinct results multiply."""
-    total: dict[_Draw, Fraction] = {((), Fraction(0), Fraction(0)): Fraction(1)}
+    total: dict[Draw, Fraction] = {((), Fraction(0), Fraction(0)): Fraction(1)}
     for drawer in drawers:
         drawn = drawer(values)
-        combined: dict[_Draw, Fraction] = {}
+        combined: dict[Draw, Fraction] = {}
         for (delta, cost, reward), p in total.items():
             for (delta2, cost2, reward2), p2 in drawn.items():
                 key = (_unite(delta, delta2), cost + cost2, reward + reward2)
                 combined[key] = combined.get(key, Fraction(0)) + p * p2
-            bounded.spend(len(drawn), len(combined))
+            spend(len(drawn), len(combined))
         total = combined
     return total
 
 
-def _unite(first: _Delta, second: _Delta) -> _Delta:
+def _unite(first: Delta, second: Delta) -> Delta:
     if not first or not second:
         return first or second
     united = dict(first)
@@ -128,26 +148,27 @@ def _unite(first: _Delta, second: _Delta) -> _Delta:
     return tuple(sorted(united.items()))
 
 
-def _compile_factor(factor: Factor, bounded: _Bounded) -> _Drawer:
+def compile_factor(factor: Factor, spend: Spend) -> Drawer:
+    """A factor as a function from values to what may be drawn."""
     outcomes = [
         (
             o.probability,
             _compile_amounts(o),
             _compile_effects(o.effects),
-            [_compile_factor(f, bounded) for f in o.factors],
+            [compile_factor(f, spend) for f in o.factors],
         )
         for o in factor.outcomes
     ]
 
-    def draw(values: Values) -> dict[_Draw, Fraction]:
-        drawn: dict[_Draw, Fraction] = {}
+    def draw(values: Values) -> dict[Draw, Fraction]:
+        drawn: dict[Draw, Fraction] = {}
         for probability, amounts, effects, nested in outcomes:
             delta, (cost, reward) = effects(values), amounts(values)
-            product = _product(values, nested, bounded)
+            product = product_of(values, nested, spend)
             for (delta2, cost2, reward2), p in product.items():
                 key = (_unite(delta, delta2), cost + cost2, reward + reward2)
                 drawn[key] = drawn.get(key, Fraction(0)) + probability * p
-            bounded.spend(len(product), len(drawn))
+            spend(len(product), len(drawn))
         return drawn
 
     return draw
@@ -168,11 +189,11 @@ def _compile_amounts(outcome: Outcome) -> _Amounts:
     return amounts
 
 
-def _compile_effects(effects: tuple[Effect, ...]) -> Callable[[Values], _Delta]:
+def _compile_effects(effects: tuple[Effect, ...]) -> Callable[[Values], Delta]:
     always = _sets(s for e in effects if e.when is None for s in e.sets)
     guarded = [(compile_condition(e.when), _sets(e.sets)) for e in effects if e.when is not None]
 
-    def delta(values: Values) -> _Delta:
+    def delta(values: Values) -> Delta:
         united = always
         for guard, sets in guarded:
             if guard(values) == Truth.TRUE:
@@ -182,7 +203,7 @@ def _compile_effects(effects: tuple[Effect, ...]) -> Callable[[Values], _Delta]:
     return delta
 
 
-def _sets(sets: Iterable[tuple[int, Truth]]) -> _Delta:
+def _sets(sets: Iterable[tuple[int, Truth]]) -> Delta:
     united: dict[int, int] = {}
     for variable, value in sets:
         united[variable] = max(int(value), united.get(variable, 0))

@@ -117,7 +117,7 @@ class Stepper:
         action = self._actions[returned - STARTED]
         if action.action not in self._transitions:
             ground = self.task.action_by_name[action.action]
-            self._transitions[action.action] = compile_action(ground, self.limits)
+            self._transitions[action.action] = compile_action(self.task, ground, self.limits)
         results = self._transitions[action.action](state.values)
         after = distribution((result.values, result.probability) for result in results)
         return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(after))

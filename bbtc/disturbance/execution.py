@@ -20,11 +20,11 @@ def careful_actions(task: Task, root: Node, limits: Limits) -> dict[str, Transit
     """The actions of a tree by name, as functions that raise :class:`bbtc.diagnostics.LimitReached` where
     there is too much that an action may lead to."""
     names = dict.fromkeys(node.action for node in actions_of(root))
-    return {name: _careful(task.action_by_name[name], limits) for name in names}
+    return {name: _careful(task, task.action_by_name[name], limits) for name in names}
 
 
-def _careful(action: GroundAction, limits: Limits) -> Transition:
-    ready, run = compile_condition(action.precondition), compile_action(action, limits)
+def _careful(task: Task, action: GroundAction, limits: Limits) -> Transition:
+    ready, run = compile_condition(action.precondition), compile_action(task, action, limits)
 
     def results(values: Values) -> tuple[Result, ...]:
         if ready(values) == Truth.TRUE:

@@ -94,17 +94,72 @@ class Factor:
     oneof: bool = False
 
 
+# --- what is hidden --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """The robot is told whether ``condition`` is true, if ``when`` is (None: always): rightly with
+    probability ``accuracy``, whichever the truth, and else wrongly. Both are read in the state after the
+    action; they are two-valued there."""
+
+    condition: Condition
+    accuracy: Fraction = Fraction(1)
+    when: Condition | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What an action does to the hidden facts of a component, and what the robot is told of them.
+
+    Conditions and effects refer to *local* variables: first the facts of the component
+    (:attr:`Component.facts`), which are two-valued in each world, then the task's variables of
+    :attr:`seen`. One outcome of every factor happens, unseen, but for what it sets of the seen variables.
+    """
+
+    component: int
+    seen: tuple[int, ...]
+    factors: tuple[Factor, ...]
+    observations: tuple[Observation, ...] = ()
+
+
+@dataclass(frozen=True)
+class Component:
+    """Hidden facts whose draws or changes depend on each other.
+
+    A *world* is a truth value for each fact, as a number: bit i is set where fact i is true. ``prior`` has
+    every possible world with its probability. ``known`` names the task's variables that tell what is known:
+    each has the value of a condition over the facts (local variables, as in :class:`Change`) that it has in
+    all worlds still possible, and is unknown where they differ. ``first`` is what the robot is told before
+    its first action; ``seen`` are the task's variables behind the facts in the local variables of that.
+    """
+
+    facts: tuple[str, ...]
+    prior: tuple[tuple[int, Fraction], ...]
+    known: tuple[tuple[int, Condition], ...]
+    first: tuple[Observation, ...] = ()
+    seen: tuple[int, ...] = ()
+
+    @cached_property
+    def memo(self) -> dict[str, object]:
+        """What others work out of it once, and keep: it goes where the component goes, to other processes,
+        too."""
+        return {}
+
+
 @dataclass(frozen=True, slots=True)
 class GroundAction:
     """A schema with its arguments. One outcome of every factor happens, independently; all
     conditions are read before any effect. Where effects of one occurrence set a variable to
-    different values, the Kleene maximum wins (delete before forget before add)."""
+    different values, the Kleene maximum wins (delete before forget before add). ``changes`` tells what
+    happens to hidden facts, at most one a component, independently of each other and of the factors."""
 
     schema: str
     args: tuple[str, ...]
     precondition: Condition
     factors: tuple[Factor, ...]
     cost: Fraction = Fraction(1)
+    changes: tuple[Change, ...] = ()
     span: Span | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -203,6 +258,9 @@ class Task:
     goal_reward: Fraction = Fraction(0)
     metric: Literal["cost", "reward"] = "cost"
     signatures: tuple[Signature, ...] = ()
+    components: tuple[Component, ...] = ()
+    """What is hidden from the robot. The variables that a component's ``known`` names are set by nothing
+    else, and have in the initial states the value that the prior gives them before anything is told."""
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property

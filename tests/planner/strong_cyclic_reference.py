@@ -15,7 +15,7 @@ from bbtc.limits import Limits
 
 def strong_cyclic_states(task: Task) -> tuple[set[Values], set[Values]]:
     """All states that are reachable, and those of them from which some policy reaches the goal for sure."""
-    transitions = [(action.precondition, compile_action(action, Limits())) for action in task.actions]
+    transitions = [(action.precondition, compile_action(task, action, Limits())) for action in task.actions]
     states = list(initial_belief(task))
     moves: dict[Values, list[frozenset[Values]]] = {}
     for state in states:

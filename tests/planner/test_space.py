@@ -30,7 +30,7 @@ Step = tuple[str, Values, Fraction, Fraction]
 
 def by_simulator(task: Task) -> dict[Values, dict[Step, Fraction]]:
     """Reachable states and the results of every choice that may leave its state."""
-    steps = {action.name: compile_action(action, Limits()) for action in task.actions}
+    steps = {action.name: compile_action(task, action, Limits()) for action in task.actions}
     found: dict[Values, dict[Step, Fraction]] = {}
     todo = list(initial_belief(task))
     while todo:

@@ -201,7 +201,7 @@ class Chooser:
                 action = doing
             else:
                 action = GroundAction(doing.template, doing.args, doing.precondition, doing.factors)
-            store[doing.name] = compile_action(action, self.limits)
+            store[doing.name] = compile_action(self.task, action, self.limits)
         return store[doing.name]
 
     def _parts(self, flaw: Flaw) -> Iterator[Candidate]:

@@ -264,7 +264,7 @@ class _Search:
             return Fraction(1), Fraction(0)
         name = insertion.doing.name
         if name not in self.transitions:
-            self.transitions[name] = compile_action(insertion.doing, self.limits)
+            self.transitions[name] = compile_action(self.task, insertion.doing, self.limits)
         chance = opened = Fraction(0)
         for result in self.transitions[name](insertion.started(values)):
             after = evaluate(insertion.subgoal.condition, result.values)

@@ -47,7 +47,7 @@ def quotient_chain(
     for state in belief:
         visit.all_from(state)
     number = {state: index for index, state in enumerate(visit.nodes)}
-    transitions = [compile_action(task.action_by_name[node.action], limits) for node in ticks.nodes]
+    transitions = [compile_action(task, task.action_by_name[node.action], limits) for node in ticks.nodes]
 
     def edges_of(values: Values, choice: int) -> tuple[Edge, ...]:
         return tuple(
