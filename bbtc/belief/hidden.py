@@ -15,7 +15,7 @@ from functools import reduce
 from math import gcd, lcm
 from typing import TypeAlias
 
-from bbtc.belief.state import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
+from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
 from bbtc.ground.condition import TRUE, compile_condition
 from bbtc.ground.task import Change, Component, Observation, Task
 from bbtc.kleene import Truth

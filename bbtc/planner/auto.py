@@ -30,8 +30,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from bbtc.belief.chain import explore
+from bbtc.belief.draws import Values
 from bbtc.belief.simulate import figures, success_of
-from bbtc.belief.state import Values
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.ground.task import Task, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits

@@ -14,8 +14,8 @@ from typing_extensions import assert_never
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
+from bbtc.belief.draws import Values
 from bbtc.belief.scenarios import Scenario, scenarios
-from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts

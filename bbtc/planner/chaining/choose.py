@@ -13,7 +13,8 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.belief.state import State, Transition, Values, compile_action
+from bbtc.belief.draws import Values
+from bbtc.belief.state import State, Transition, compile_action
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts, evaluate, variables
 from bbtc.ground.task import GroundAction, Task, effects_of
 from bbtc.kleene import Truth, negate

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import assert_never
 
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
