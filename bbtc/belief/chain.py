@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
-from bbtc.belief.state import Result, State, Transition, Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits

@@ -15,7 +15,7 @@ from functools import reduce
 from math import gcd, lcm
 from typing import TypeAlias
 
-from bbtc.belief.state import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
+from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
 from bbtc.ground.condition import TRUE, compile_condition
 from bbtc.ground.task import Change, Component, Observation, Task
 from bbtc.kleene import Truth
@@ -33,8 +33,8 @@ class Beliefs:
     by_number: list[Belief] = field(default_factory=list)
     _numbers: dict[Belief, int] = field(default_factory=dict)
     _known: list[Delta] = field(default_factory=list)
-    _facts: dict[int, tuple[int, ...]] = field(default_factory=dict)
-    """By world: the value of each condition of :attr:`Component.known`."""
+    _true: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    """By world: which of the conditions of :attr:`Component.known` are true."""
 
     def number(self, weights: Iterable[tuple[int, Fraction]]) -> int:
         """The number of the belief with these weights of worlds, which need not sum to 1."""
@@ -51,24 +51,32 @@ class Beliefs:
         return self._known[number]
 
     def _known_in(self, belief: Belief) -> Delta:
-        values: tuple[int, ...] | None = None
-        for world, _ in belief:
-            facts = self._facts.get(world)
-            if facts is None:
-                facts = self._facts[world] = self._facts_of(world)
-            values = (
-                facts
-                if values is None
-                else tuple(a if a == b else int(Truth.UNKNOWN) for a, b in zip(values, facts, strict=True))
-            )
-        assert values is not None  # a belief has a world
+        true = [0] * len(self.component.known)
+        for world, weight in belief:
+            for at in self._true_in(world):
+                true[at] += weight
+        total = sum(weight for _, weight in belief)
         return tuple(
-            (variable, value) for (variable, _), value in zip(self.component.known, values, strict=True)
+            (knowledge.variable, int(_believed(weight, total, knowledge.at_least)))
+            for knowledge, weight in zip(self.component.known, true, strict=True)
         )
 
-    def _facts_of(self, world: int) -> tuple[int, ...]:
-        local = local_values(self.component, world)
-        return tuple(compile_condition(condition)(local) for _, condition in self.component.known)
+    def _true_in(self, world: int) -> tuple[int, ...]:
+        found = self._true.get(world)
+        if found is None:
+            local = local_values(self.component, world)
+            values = (compile_condition(knowledge.condition)(local) for knowledge in self.component.known)
+            found = tuple(at for at, value in enumerate(values) if value == Truth.TRUE)
+            self._true[world] = found
+        return found
+
+
+def _believed(weight: int, total: int, at_least: Fraction) -> Truth:
+    """What is believed of a condition with this weight."""
+    enough = at_least.numerator * total
+    if weight * at_least.denominator >= enough:
+        return Truth.TRUE
+    return Truth.FALSE if (total - weight) * at_least.denominator >= enough else Truth.UNKNOWN
 
 
 def beliefs_of(component: Component) -> Beliefs:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from bbtc.belief.state import State, Transition, Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import State, Transition, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, Tick, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from bbtc.belief.state import Result, Transition, Values, compile_action
+from bbtc.belief.draws import Values
+from bbtc.belief.state import Result, Transition, compile_action
 from bbtc.ground.condition import compile_condition
 from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth

@@ -6,7 +6,8 @@ checking" (2003): take away what can no longer stay within the rest and reach th
 
 from __future__ import annotations
 
-from bbtc.belief.state import Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import compile_action, initial_belief
 from bbtc.ground.condition import evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth

@@ -11,7 +11,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bbtc.belief.state import Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import compile_action, initial_belief
 from bbtc.ground.condition import TRUE, Is, conjunction, evaluate
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth

@@ -30,8 +30,9 @@ from itertools import count
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
+from bbtc.belief.draws import Values
 from bbtc.belief.failures import FailureFinder
-from bbtc.belief.state import Transition, Values, compile_action
+from bbtc.belief.state import Transition, compile_action
 from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import evaluate

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.belief.state import PLACES, Values
+from bbtc.belief.draws import PLACES, Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth

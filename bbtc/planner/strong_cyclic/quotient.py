@@ -17,7 +17,8 @@ from typing import TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.belief.chain import Chain, Edge
-from bbtc.belief.state import State, Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import State, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus
 from bbtc.ground.condition import Condition, variables
 from bbtc.ground.task import Task, charges_of
