@@ -178,7 +178,7 @@ class _Mapper:
 
     def component(self, component: gt.Component) -> gt.Component:
         """The component over the kept variables."""
-        known = tuple((self.renumber[variable], condition) for variable, condition in component.known)
+        known = tuple(replace(each, variable=self.renumber[each.variable]) for each in component.known)
         return replace(component, known=known, seen=self._seen(component.seen))
 
     def _seen(self, seen: Iterable[int]) -> tuple[int, ...]:

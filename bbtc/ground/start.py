@@ -17,7 +17,7 @@ from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 from bbtc.model.formula import is_parameter
-from bbtc.model.hidden import has_hidden_state
+from bbtc.model.hidden import has_hidden_state, has_oneof
 from bbtc.model.types import Parameter
 from bbtc.source import Span
 
@@ -103,7 +103,7 @@ def _prior(model: md.Model, facts: World, report: Report, limits: Limits) -> Pri
                     weighted.append((_draw(model, part, {}, limits), part.span))
         except _TooMany:
             report.error(
-                "BBT0415",
+                "BBT0404" if has_oneof(choice) else "BBT0403",
                 f"a draw in `:init` has more than {MOST_WORLDS:,} results",
                 choice.span,
                 "what is hidden is listed world by world: draw facts that are independent one by one",

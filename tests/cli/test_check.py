@@ -138,10 +138,11 @@ def test_two_domains_of_one_name_are_both_checked(folder: Path) -> None:
 NOT_YET = """(define (domain look)
   (:requirements :contingent)
   (:predicates (unknown (seen)) (here) (there))
-  (:action look :precondition (unknown (seen)) :observe (seen))
-  (:action go :precondition (here) :effect (there)))
+  (:action look :precondition (unknown (seen)) :observe (probabilistic 0.9 (and (seen) (here))))
+  (:action go :precondition (here) :effect (there))
+  (:sensor eye :sensed (here)))
 (define (problem p) (:domain look)
-  (:init (unknown (seen)) (oneof (here) (there)) (or (here) (there)))
+  (:init (unknown (seen)) (oneof (here) (there)) (invariant (here) (there)))
   (:metric minimize (total-cost)))
 """
 
@@ -151,7 +152,7 @@ def test_what_compile_will_refuse_is_noted(tmp_path: Path) -> None:
     (tmp_path / "look.pddl").write_text(NOT_YET)
     status, checked = bbtc("check", "look.pddl", folder=tmp_path)
     noted = set(re.findall(r"(\S+): note\[(BBT04\d\d)\]", checked))
-    assert {code for _, code in noted} == {"BBT0404", "BBT0405", "BBT0406", "BBT0411"}
+    assert {code for _, code in noted} == {"BBT0405", "BBT0406", "BBT0407", "BBT0411"}
     assert status == 0
     status, compiled = bbtc("compile", "look.pddl", folder=tmp_path)
     assert set(re.findall(r"(\S+): error\[(BBT04\d\d)\]", compiled)) == noted
@@ -265,10 +266,11 @@ def test_a_goal_too_large_to_look_into_is_judged_by_predicates_alone(
 def test_a_goal_of_what_cannot_be_compiled_yet_is_judged_by_predicates_alone(tmp_path: Path) -> None:
     domain = """(define (domain d) (:requirements :typing :unknown) (:predicates (shut) (done) (other))
       (:action look :precondition (unknown (shut)) :observe (shut))
+      (:sensor eye :sensed (shut))
       (:action act :precondition (shut) :effect (done)))
       (define (problem x) (:domain d) (:init (unknown (shut))) (:goal {}))"""
     for goal, warned in (("(done)", False), ("(other)", True)):
         (tmp_path / "look.pddl").write_text(domain.format(goal))
         _, messages = bbtc("check", "look.pddl", folder=tmp_path)
         assert ("BBT0316" in messages) is warned
-        assert "BBT0406" in messages
+        assert "BBT0407" in messages

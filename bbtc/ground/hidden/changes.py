@@ -32,7 +32,9 @@ class Act:
     readings: tuple[gt.Observation, ...]
 
 
-def act(action: gt.GroundAction, readings: Iterable[gt.Observation], kept: Set[int], hidden: frozenset[int]) -> Act:
+def act(
+    action: gt.GroundAction, readings: Iterable[gt.Observation], kept: Set[int], hidden: frozenset[int]
+) -> Act:
     """An action, as far as it matters: ``kept`` variables, of which some are ``hidden``."""
     parts = parts_of(action.factors)
     draws = [only(draw, kept) for draw in parts.draws]

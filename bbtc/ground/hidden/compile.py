@@ -12,7 +12,7 @@ from bbtc.ground import task as gt
 from bbtc.ground.condition import Condition, Is, compile_condition, variables
 from bbtc.ground.hidden.changes import Local, act, divided, join
 from bbtc.ground.hidden.groups import Groups
-from bbtc.ground.hidden.knowledge import Knowledge, TooManyCases
+from bbtc.ground.hidden.knowledge import KnownConditions, TooManyCases
 from bbtc.ground.hidden.naming import formula_names
 from bbtc.ground.hidden.parts import Setting, all_settings, effects_of, settings_of
 from bbtc.ground.hidden.physical import Physical, physical
@@ -42,7 +42,7 @@ class _Read:
 
     goal: Condition
     preconditions: list[Condition]
-    knowledge: Knowledge
+    knowledge: KnownConditions
 
 
 class _Compiler:
@@ -119,7 +119,7 @@ class _Compiler:
         task = self._found.task
         while True:
             self._limits.check_time("grounding")
-            knowledge = Knowledge(self._groups, len(task.variables))
+            knowledge = KnownConditions(self._groups, len(task.variables))
             goal = self._known(knowledge, task.goal, task.goal_span)
             preconditions = [
                 self._known(knowledge, each.action.precondition, each.action.span) for each in self._acts
@@ -130,7 +130,7 @@ class _Compiler:
                 return _Read(goal, preconditions, knowledge)
 
     def _known(
-        self, knowledge: Knowledge, condition: Condition, span: Span | None, *, truth: bool = True
+        self, knowledge: KnownConditions, condition: Condition, span: Span | None, *, truth: bool = True
     ) -> Condition:
         try:
             return knowledge.known(condition, truth=truth)
@@ -142,7 +142,7 @@ class _Compiler:
                 "say what is hidden in a condition of its own, as a derived predicate",
             ) from None
 
-    def _template(self, template: gt.GroundTemplate, knowledge: Knowledge) -> gt.GroundTemplate:
+    def _template(self, template: gt.GroundTemplate, knowledge: KnownConditions) -> gt.GroundTemplate:
         """A template whose conditions read knowledge; what its guide makes true becomes known."""
 
         def body(part: gt.Body) -> gt.Body:
@@ -174,7 +174,7 @@ class _Compiler:
 
     # --- variables and components ------------------------------------------------------------
 
-    def _variables(self, knowledge: Knowledge) -> tuple[gt.Variable, ...]:
+    def _variables(self, knowledge: KnownConditions) -> tuple[gt.Variable, ...]:
         declared = self._model.predicates
         made = [
             replace(
@@ -187,7 +187,7 @@ class _Compiler:
         names = formula_names(made, list(knowledge.formulas))
         return (*made, *(gt.Variable(name, (), three_valued=True, hidden=True) for name in names))
 
-    def _component(self, facts: Sequence[int], knowledge: Knowledge, asked: set[int]) -> gt.Component:
+    def _component(self, facts: Sequence[int], knowledge: KnownConditions, asked: set[int]) -> gt.Component:
         self._limits.check_time("listing worlds")
         mine, start = set(facts), self._found.start
         draws = [draw for draw in self._draws if mine.issuperset(draw.variables) and draw.variables]
@@ -216,9 +216,9 @@ class _Compiler:
             contradicted(self._report, spans[0] if spans else self._model.init.span)
             prior = {0: Fraction(1)}
         local = Local(facts)
-        known = [(fact, local.condition(Is(fact, Truth.TRUE))) for fact in facts if fact in asked]
+        known = [gt.Knowledge(fact, local.condition(Is(fact, Truth.TRUE))) for fact in facts if fact in asked]
         known += [
-            (number, local.condition(formula))
+            gt.Knowledge(number, local.condition(formula))
             for formula, number in knowledge.formulas.items()
             if mine.issuperset(variables(formula)) and number in asked
         ]
@@ -231,10 +231,10 @@ def _known_at_first(component: gt.Component) -> Iterator[tuple[int, Truth]]:
         bytes(2 * (world >> place & 1) for place in range(len(component.facts)))
         for world, _ in component.prior
     ]
-    for variable, condition in component.known:
-        value = compile_condition(condition)
+    for each in component.known:
+        value = compile_condition(each.condition)
         found = {value(world) for world in worlds}
-        yield variable, Truth(found.pop()) if len(found) == 1 else Truth.UNKNOWN
+        yield each.variable, Truth(found.pop()) if len(found) == 1 else Truth.UNKNOWN
 
 
 def _asked(task: gt.Task) -> Iterator[int]:

@@ -43,7 +43,7 @@ class TooManyCases(Exception):
     """A condition mixes too many visible facts with hidden ones of one component."""
 
 
-class Knowledge:
+class KnownConditions:
     """Makes conditions on what is known. Components that one formula needs are joined in ``groups``, and
     ``joined`` tells that there were such: then all has to be made anew."""
 
