@@ -70,7 +70,8 @@ def test_visible_facts_in_a_formula_are_settled_by_cases() -> None:
       (:action flip :parameters (?s - s) :effect (on ?s))
       (:action trace :parameters (?s - s) :observe (wired ?s))
       (:action read :precondition (exists (?s - s) (and (wired ?s) (on ?s))) :effect (done)))
-      (define (problem x) (:domain d) (:objects l r - s) (:init (oneof (wired l) (wired r))) (:goal (done)))"""
+      (define (problem x) (:domain d) (:objects l r - s)
+        (:init (oneof (wired l) (wired r))) (:goal (done)))"""
     # Both switches, then read; a look at the wires costs as much as a second switch.
     assert best(task_of(text)) == (1, 3)
 
@@ -139,7 +140,7 @@ def _published() -> list[tuple[str, str, int, Fraction]]:
     table = Path(__file__).parents[3] / "shared" / "hidden" / "optima.tsv"
     if not table.is_file():
         return []
-    rows = [line.split("\t") for line in table.read_text("utf-8").splitlines() if line[:1] not in "#"]
+    rows = [line.split("\t") for line in table.read_text("utf-8").splitlines() if line[:1] != "#"]
     return [(row[0], row[1], int(row[3]), Fraction(row[5])) for row in rows if row[0] != "domain"]
 
 

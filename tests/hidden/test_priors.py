@@ -56,7 +56,8 @@ def _sets(*worlds: tuple[str, str]) -> dict[frozenset[str], Fraction]:
         ("(oneof (p a) (p b)) (unknown (p a)) (unknown (p b)) (p c) (q)", [("a", "1/2"), ("b", "1/2")]),
         # Of branches that are compound the branch is drawn.
         ("(oneof (and (p a) (p b)) (p c)) (q)", [("ab", "1/2"), ("c", "1/2")]),
-        ("(oneof (and (p a) (p b)) (and (p a) (p c)) (and)) (q)", [("ab", "1/3"), ("ac", "1/3"), ("", "1/3")]),
+        ("(oneof (and (p a) (p b)) (and (p a) (p c)) (and)) (q)",
+         [("ab", "1/3"), ("ac", "1/3"), ("", "1/3")]),
         # What is given is given.
         ("(oneof (p a) (p b) (p c)) (not (p a)) (q)", [("b", "1/2"), ("c", "1/2")]),
         ("(or (p a) (p b)) (p a) (unknown (p b)) (p c) (q)", [("", "1/2"), ("b", "1/2")]),
