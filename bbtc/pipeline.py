@@ -362,7 +362,11 @@ def ground_model(model: Model, report: Report, limits: Limits) -> Task:
 
     task = ground(model, report, limits)
     report.raise_errors()
-    return task
+    if not task.components:
+        return task
+    from bbtc.belief.lowering import lowered
+
+    return lowered(task, limits)
 
 
 def plan_task(
