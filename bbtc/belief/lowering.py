@@ -210,7 +210,7 @@ def _without(task: Task, found: dict[int, _Lowering]) -> Task:
         for name, factor in lowering.factors():
             more.setdefault(name, []).append(factor)
         for variable, values in lowering.values():
-            seen[variable] = replace(seen[variable], three_valued=Truth.UNKNOWN in values, hidden=False)
+            seen[variable] = replace(seen[variable], three_valued=Truth.UNKNOWN in values)
     left = [number for number in range(len(task.components)) if number not in found]
     renumber = {number: place for place, number in enumerate(left)}
     actions = tuple(_action(action, more.get(action.name, ()), renumber) for action in task.actions)

@@ -159,6 +159,32 @@ def test_what_compile_will_refuse_is_noted(tmp_path: Path) -> None:
     assert status == 1
 
 
+HIDING = """(define (domain chest)
+  (:requirements :contingent :conditional-effects :disjunctive-preconditions)
+  (:predicates (gold ?x) (lead ?x) (rich))
+  (:action look :parameters (?x) :observe (gold ?x))
+  (:action take :parameters (?x) :precondition (or (gold ?x) (lead ?x)) :effect (when (gold ?x) (rich))))
+(define (problem two) (:domain chest) (:objects a b)
+  (:init (oneof (gold a) (lead a)) (oneof (gold b) (lead b)){}) (:goal (rich)))
+"""
+
+
+def test_what_is_hidden_is_told_with_its_groups(tmp_path: Path) -> None:
+    (tmp_path / "chest.pddl").write_text(HIDING.format(""))
+    status, messages = bbtc("check", "chest.pddl", folder=tmp_path)
+    assert status == 0
+    # Whether one is rich depends on both.
+    assert "chest/two: 5 hidden facts in 1 component\n" in messages
+    assert "  gold(a), gold(b), lead(a), lead(b), rich(): 4 worlds\n" in messages
+
+
+def test_a_start_that_contradicts_itself_is_an_error_of_a_check(tmp_path: Path) -> None:
+    (tmp_path / "chest.pddl").write_text(HIDING.format(" (not (gold a)) (not (lead a))"))
+    status, messages = bbtc("check", "chest.pddl", folder=tmp_path)
+    assert status == 1
+    assert re.findall(r"(\S+): error\[(BBT\d+)\]", messages) == [("chest.pddl:7:10", "BBT0414")]
+
+
 # --- root causes -----------------------------------------------------------------------------
 
 HOUSEHOLD = Path(__file__).parents[2] / "domains" / "household"
