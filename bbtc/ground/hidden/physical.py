@@ -88,7 +88,7 @@ def _told(
 ) -> list[tuple[Lowered, Fraction]]:
     """What is told, and how likely it is right: every part of a conjunction by itself."""
     if not isinstance(observed, me.Choice):
-        return [(lowering.condition(part, frame), Fraction(1)) for part in conjuncts(normal_form(observed))]
+        return [(lowering.condition(normal_form(part), frame), Fraction(1)) for part in conjuncts(observed)]
     noisy = noise(observed)
     assert noisy is not None  # others are refused
     fact, accuracy = noisy

@@ -169,7 +169,8 @@ class ProgramBuilder:
             if len(body) > 1 or len(terms) < len(scope):
                 body = self._named(body, terms)
         for leaf in group.sets:
-            self._rule(self._call(f"{LETTER[leaf.value]}{self.number[leaf.predicate]}", leaf.args), body)
+            for value in self.usage.values_of(leaf):
+                self._rule(self._call(f"{LETTER[value]}{self.number[leaf.predicate]}", leaf.args), body)
 
     # --- rule bodies -------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.hidden import has_hidden_state
 from bbtc.model.types import Parameter
 
 
@@ -39,6 +40,8 @@ class Usage:
         self.start = start
         self.blocks = {name: normalise(schema.effect) for name, schema in model.schemas.items()}
         self.set_values = md.set_values(model)
+        self.clouded = self._clouded() if has_hidden_state(model) else frozenset()
+        """Predicates whose facts may be hidden though none is at the start."""
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
         self.open = open_predicates(model)
@@ -63,7 +66,27 @@ class Usage:
         """Whether some atom of the predicate may be unknown at some time."""
         if predicate in self.derived:
             return predicate not in self.unchanging and self.model.predicates[predicate].three_valued
-        return Truth.UNKNOWN in self.set_values.get(predicate, ()) or bool(self.start.unknown.get(predicate))
+        made = Truth.UNKNOWN in self.set_values.get(predicate, ()) or predicate in self.clouded
+        return made or bool(self.start.unknown.get(predicate))
+
+    def values_of(self, leaf: me.Set) -> tuple[Truth, ...]:
+        """The values that an atom may have for the robot once an effect has set it: it need not see that the
+        effect happened, and what becomes unknown is drawn."""
+        if leaf.predicate not in self.clouded:
+            return (leaf.value,)
+        return tuple(Truth) if leaf.value is Truth.UNKNOWN else (leaf.value, Truth.UNKNOWN)
+
+    def _clouded(self) -> frozenset[str]:
+        """Predicates that an effect makes unknown, or sets under a condition or by chance."""
+        found: set[str] = set()
+        for block in self.blocks.values():
+            plain = set(map(id, block.items))
+            for item, _ in items(block, ()):
+                if isinstance(item.leaf, me.Set) and (
+                    item.guard or item.leaf.value is Truth.UNKNOWN or id(item) not in plain
+                ):
+                    found.add(item.leaf.predicate)
+        return frozenset(found)
 
     def _only_reading(self, base: set[str]) -> set[str]:
         """Derived predicates that only read, all the way down, predicates of ``base``. Where these are
