@@ -49,6 +49,7 @@ def figures_to_json(
         "actions_given_success": _figure(figures.actions_given_success),
         "reward": _figure(figures.reward),
         "states": figures.states,
+        **({"mistaken": figure_text(figures.mistaken)} if figures.mistaken else {}),
         "scenarios": [
             {
                 "p": figure_text(run.probability),

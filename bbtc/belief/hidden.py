@@ -8,7 +8,7 @@ still possible.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import gcd, lcm
@@ -16,9 +16,21 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
 from bbtc.diagnostics import BbtcError
-from bbtc.ground.condition import TRUE, Condition, compile_condition
-from bbtc.ground.task import ZERO, Change, Component, Knowledge, Observation, Task
+from bbtc.ground.condition import (
+    TRUE,
+    Condition,
+    Constant,
+    Is,
+    Known,
+    compile_condition,
+    evaluate,
+    leaves,
+    replaced,
+    variables,
+)
+from bbtc.ground.task import ONE, ZERO, Change, Component, Knowledge, Observation, Task
 from bbtc.kleene import Truth
+from bbtc.markov import distribution
 
 Belief: TypeAlias = tuple[tuple[int, int], ...]
 """Worlds still possible, in order, with weights: positive integers without a common divisor."""
@@ -157,6 +169,51 @@ def told_first(task: Task, values: Values) -> Iterator[tuple[Values, Fraction]]:
         for place, value in delta:
             after[place] = value
         yield bytes(after), probability
+
+
+def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
+    """How probable it is in a state that a condition on what is known is really so: what it reads of hidden
+    facts has the value that it has in the world. ``(known …)`` and ``(unknown …)`` ask what is known there,
+    too."""
+    read = set(variables(condition))
+    told = {leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if _asks(leaf)}
+    condition = replaced(condition, lambda leaf: told.get(leaf, leaf))
+    worlds: dict[bytes, Fraction] = {bytes(values): ONE}
+    for index, component in enumerate(task.components):
+        known = [each for each in component.known if each.variable in read]
+        if known:
+            drawn = _drawn(task, values, index, known)
+            worlds = distribution(
+                (_with(world, sets), probability * p)
+                for world, probability in worlds.items()
+                for sets, p in drawn.items()
+            )
+    return sum((p for world, p in worlds.items() if evaluate(condition, world) is Truth.TRUE), ZERO)
+
+
+def _asks(leaf: Is | Known) -> bool:
+    return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
+
+
+def _drawn(task: Task, values: Values, index: int, known: Sequence[Knowledge]) -> dict[Delta, Fraction]:
+    """The values that some conditions have in the world, and how probable they are."""
+    component = task.components[index]
+    belief = belief_in(task, values, index)
+    total = sum(weight for _, weight in belief)
+    tests = [(each.variable, compile_condition(each.condition)) for each in known]
+
+    def truths(world: int) -> Delta:
+        local = local_values(component, world)
+        return tuple((variable, test(local)) for variable, test in tests)
+
+    return distribution((truths(world), Fraction(weight, total)) for world, weight in belief)
+
+
+def _with(values: bytes, sets: Delta) -> bytes:
+    after = bytearray(values)
+    for place, value in sets:
+        after[place] = value
+    return bytes(after)
 
 
 # --- changes -----------------------------------------------------------------------------------
