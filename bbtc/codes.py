@@ -131,11 +131,16 @@ _CODES = (
     Code("BBT0411", "no goal to plan for"),
     Code("BBT0412", "goal out of reach", root_cause=True),
     Code("BBT0413", "goal already holds", _WARNING),
+    Code("BBT0414", "no world is left"),
+    Code("BBT0415", "too many worlds"),
+    Code("BBT0416", "condition that mixes too much"),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),
     Code("BBT0503", "option that the strategy does not know", exit=ExitStatus.USAGE),
     Code("BBT0504", "a tree would have more levels than one may have", exit=ExitStatus.LIMIT),
+    Code("BBT0505", "strategy that does not plan with hidden facts", exit=ExitStatus.USAGE),
+    Code("BBT0506", "hidden facts where they cannot be taken into account"),
     # 06xx: artefacts, and the shape of trees
     Code("BBT0601", "artefact is not valid JSON"),
     Code("BBT0602", "artefact of another format or version"),

@@ -31,7 +31,7 @@ _MOST_STEPS = 12  # actions told of one run
 
 def changes(tree: Tree, before: bytes, after: bytes) -> str:
     """``seen(soda) = true, …``: the variables that differ, with their new values."""
-    pairs = zip(tree.task.variables, before, after, strict=True)
+    pairs = zip(tree.task.variables, before, after, strict=False)  # behind them: what is believed
     changed = [f"{variable.name} = {Truth(new).word}" for variable, old, new in pairs if old != new]
     return printable(", ".join(changed)) or "no change"
 
@@ -110,6 +110,8 @@ def _has_oneof(factor: Factor) -> bool:
 def figures_report(tree: Tree, figures: Figures) -> list[str]:
     """The figures of a tree as lines of text."""
     lines = [f"success   {exact(figures.success)}", f"failure   {exact(figures.failure)}"]
+    if figures.mistaken:
+        lines.append(f"mistaken  {exact(figures.mistaken)}: the tree succeeds, but the goal is not true")
     if figures.blocked:
         lines.append(f"blocked   {exact(figures.blocked)}")
     if figures.endless:

@@ -6,7 +6,7 @@ and costs are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -123,22 +123,38 @@ class Change:
     observations: tuple[Observation, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """A three-valued variable of the task tells what is believed of a condition over the facts of a component
+    (local variables, as in :class:`Change`): it is true where the condition is so with a probability of
+    ``at_least``, false where it is false with that, and else unknown. With 1, the default, it tells what is
+    known: what holds in all worlds still possible. ``at_least`` is above 1/2."""
+
+    variable: int
+    condition: Condition
+    at_least: Fraction = Fraction(1)
+
+
 @dataclass(frozen=True)
 class Component:
     """Hidden facts whose draws or changes depend on each other.
 
     A *world* is a truth value for each fact, as a number: bit i is set where fact i is true. ``prior`` has
-    every possible world with its probability. ``known`` names the task's variables that tell what is known:
-    each has the value of a condition over the facts (local variables, as in :class:`Change`) that it has in
-    all worlds still possible, and is unknown where they differ. ``first`` is what the robot is told before
-    its first action; ``seen`` are the task's variables behind the facts in the local variables of that.
+    every possible world with its probability. ``known`` are the task's variables that tell what is known.
+    ``first`` is what the robot is told before its first action; ``seen`` are the task's variables behind the
+    facts in the local variables of that.
     """
 
     facts: tuple[str, ...]
     prior: tuple[tuple[int, Fraction], ...]
-    known: tuple[tuple[int, Condition], ...]
+    known: tuple[Knowledge, ...]
     first: tuple[Observation, ...] = ()
     seen: tuple[int, ...] = ()
+
+    def local(self, task: Task, seen: Sequence[int]) -> tuple[Variable, ...]:
+        """The local variables: a two-valued one for each fact, then the seen variables of the task."""
+        facts = (Variable(*split_name(fact), three_valued=False, hidden=True) for fact in self.facts)
+        return (*facts, *(task.variables[variable] for variable in seen))
 
     @cached_property
     def memo(self) -> dict[str, object]:
@@ -274,6 +290,14 @@ class Task:
         return {action.name: action for action in self.actions}
 
     @cached_property
+    def endless_beliefs(self) -> bool:
+        """May ever new beliefs follow from each other, since readings are noisy or hidden facts change by
+        chance?"""
+        changes = [change for action in self.actions for change in action.changes]
+        noisy = any(each.accuracy not in (0, 1) for change in changes for each in change.observations)
+        return noisy or any(len(factor.outcomes) > 1 for change in changes for factor in change.factors)
+
+    @cached_property
     def counts_reward(self) -> bool:
         """Is there anything that adds to the reward, or a metric of it?"""
         outcomes = outcomes_of(factor for action in self.actions for factor in action.factors)
@@ -308,6 +332,26 @@ def effects_of(factors: Iterable[Factor]) -> Iterator[Effect]:
 def charges_of(factors: Iterable[Factor]) -> Iterator[Charge]:
     """Every charge that some occurrence of the factors can make."""
     return (charge for outcome in outcomes_of(factors) for charge in outcome.charges)
+
+
+def apparent_factors(task: Task, doing: GroundAction | GroundTemplate) -> tuple[Factor, ...]:
+    """The factors of an action or a guide and, for what it does to hidden facts, all that it might make seen
+    or known: more than can be, with no probabilities of their own, for what relaxes the task."""
+    if not isinstance(doing, GroundAction) or not doing.changes:
+        return doing.factors
+    found = list(doing.factors)
+    for change in doing.changes:
+        component = task.components[change.component]
+        facts = len(component.facts)
+        for effect in effects_of(change.factors):
+            sets = ((local - facts, value) for local, value in effect.sets if local >= facts)
+            if seen := tuple((change.seen[at], value) for at, value in sets):
+                found.append(Factor((Outcome(ONE, (Effect(None, seen),)),)))
+        third = Fraction(1, 3)
+        for knowledge in component.known:
+            maybe = (Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth)
+            found.append(Factor(tuple(maybe)))
+    return tuple(found)
 
 
 def walk_body(body: Body) -> Iterator[Body]:

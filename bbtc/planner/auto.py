@@ -190,7 +190,7 @@ class _Auto:
                 self.add(step())
         if not self.interrupted:
             self.add(self.refinement(refined))
-        if not self.interrupted and not options.closed_world:
+        if not self.interrupted and not options.closed_world and not task.components:
             with suppress(LimitReached):
                 self.go_on_from_elsewhere()
 
@@ -294,7 +294,8 @@ class _Auto:
         if self.met and (nodes == 1 or actions > MANY_ACTIONS):
             return None
         work = _WORK_FOR_LARGE if nodes > LARGE_TREE else STATES_AND_ACTIONS
-        few = replace(self.limits, states=max(1, min(self.limits.states, work // max(1, actions))))
+        most = max(1, min(self.limits.states, work // max(1, actions)))
+        few = replace(self.limits, states=most)
         try:
             return plan_policy(self.task, self.target, few, _silent, self.options, whole=True)
         except LimitReached:  # more states than that
@@ -302,7 +303,7 @@ class _Auto:
 
     def surely(self) -> Plan | None:
         """A policy over partial states, unless there is none that surely reaches the goal."""
-        if self.upper < 1:
+        if self.upper < 1 or self.task.components:
             return None
         limits = self.limits.part(_SURE_SHARE)
         if self.met:
