@@ -335,7 +335,7 @@ def charges_of(factors: Iterable[Factor]) -> Iterator[Charge]:
 
 
 def seen_factors(task: Task, action: GroundAction) -> tuple[Factor, ...]:
-    """The factors of an action and, for what it does to hidden facts, all that it might set of seen variables:
+    """The factors of an action and, of what it does to hidden facts, all it might set of seen variables:
     more than can be, with no probabilities of their own, for what relaxes the task."""
     found = list(action.factors)
     for change in action.changes:
