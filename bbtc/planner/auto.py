@@ -21,6 +21,9 @@
    tree is not asked for, plan as in 3 and 4 once more, for what others may make of visited states, too
    (:mod:`bbtc.planner.elsewhere`).
 
+Where facts are hidden: an optimal policy over what is believed, a search over refinements, and, where neither
+met the target, greedy refinement.
+
 ``advised`` trusts templates, their author's advice on how things are done, more than figures: where a task
 has some, and refinement meets the target, its tree is taken; else ``auto``.
 """
