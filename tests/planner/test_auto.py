@@ -159,7 +159,7 @@ def test_a_large_tree_is_worth_a_longer_second_opinion(monkeypatch: pytest.Monke
     (of,) = (task_of(p) for p in PROBLEMS if str(p) == "warehouse/blocked-aisle")
     found, small = size(plan(of, "search")), size(plan(of, "policy"))
     assert small < found
-    for bound in ("_LOOKS", "_LOOKS_ELSEWHERE"):
+    for bound in ("_LOOKS", "_LOOKS_ELSEWHERE", "_LOOKS_RECOVERING"):
         monkeypatch.setattr(f"bbtc.planner.auto.{bound}", 0)
     monkeypatch.setattr("bbtc.planner.auto.STATES_AND_ACTIONS", 1)
     monkeypatch.setattr("bbtc.planner.auto.LARGE_TREE", found)
