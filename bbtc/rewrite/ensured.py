@@ -21,7 +21,7 @@ from bbtc.belief.tick import STARTED, NodeStatus
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of
+from bbtc.tree.nodes import COUNTING, ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of
 
 _ANY = 0b111  # a set of truth values: bit i stands for the value i
 _TWO = 0b101
@@ -149,7 +149,7 @@ def returned(task: Task, node: Node, status: NodeStatus, *, bounded: bool = Fals
         case ControlNode():
             bounded = bounded or node.kind == "retry"
             parts = [returned(task, child, status, bounded=bounded) for child in node.children]
-            if node.kind == "retry":
+            if node.kind in COUNTING:
                 return parts[0]
             if status is GO_ON[node.kind]:
                 return All(tuple(parts))
@@ -181,7 +181,7 @@ def may_return(task: Task, root: Node) -> dict[str, set[int]]:
             with facts.meanwhile():
                 for child in node.children:
                     visit(child, bounded=bounded)
-                    if node.kind != "retry":
+                    if node.kind not in COUNTING:
                         facts.add(returned(task, child, GO_ON[node.kind], bounded=bounded))
 
     visit(root, bounded=False)
