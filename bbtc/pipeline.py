@@ -393,6 +393,7 @@ def plan_task(
     from bbtc.planner.guard import guarded
     from bbtc.planner.options import DEFAULTS
     from bbtc.planner.strategies import run_strategy
+    from bbtc.planner.subgoals import with_subgoals
     from bbtc.tree.validate import check_tree
 
     wanted = task.goal_probability if target is None else target
@@ -417,6 +418,7 @@ def plan_task(
         plan = plan or best.plan("interrupted")
     if not options.closed_world:
         plan = guarded(plan)
+    plan = replace(plan, tree=replace(plan.tree, root=with_subgoals(task, plan.tree.root)))
     check_tree(plan.tree)
     broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:

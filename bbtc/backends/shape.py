@@ -35,8 +35,8 @@ needs a Python frame or two a level."""
 _LONGEST_LABEL = 60
 
 DEEPEST_CONDITION = 100
-"""Levels of ``and``, ``or`` and ``not`` an exported condition may have, as many as are read by default: each is
-a level of XML, besides some 130 of the tree around it, or a parenthesis of Python, which takes 200."""
+"""Levels of ``and``, ``or`` and ``not`` an exported condition may have, as many as are read by default: each
+is a level of XML, besides some 130 of the tree around it, or a parenthesis of Python, which takes 200."""
 
 
 def fit(root: Node, engine: str) -> Node:

@@ -384,7 +384,7 @@ def test_the_deepest_condition_that_is_taken_keeps_its_value(around: int) -> Non
         kind: ControlKind = "fallback" if level % 2 else "sequence"
         root = ControlNode(f"around{level}", kind, (root,))
     tree = tree_of(root, *variables)
-    assert DEEPEST_CONDITION >= Limits().depth
+    assert Limits().depth <= DEEPEST_CONDITION
     for replay in (BtcppReplay(tree), PyTreesReplay(tree)):
         for values in ((p, q) for p in range(3) for q in range(3)):
             expected = "success" if value_of(condition, values) == "T" else "failure"
