@@ -16,7 +16,16 @@ from bbtc.ground.condition import TRUE, Condition, Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, tree_depth, walk
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlKind,
+    ControlNode,
+    Node,
+    tree_depth,
+    tries_without_end,
+    walk,
+)
 from tests.domains.brute_force import brute_force
 from tests.planner.test_refine import action, task
 
@@ -100,6 +109,19 @@ def test_a_halted_one_begins_anew() -> None:
     figures = simulate(ajar, root, Limits())
     assert (figures.success, figures.actions) == (1, 3)
     assert abs(brute_force(ajar, root).actions - 3) < Fraction(1, 10**9)
+
+
+def test_latched_actions_below_it_may_go_on_without_end() -> None:
+    stiff = task(
+        "shut ajar", {}, HEADS, action("push", TRUE, ("1", {1: T})), action("clear", TRUE, ("1", {1: F}))
+    )
+    clear = of("sequence", ConditionNode("ajar", Is(1, T)), replace(until(1, do("clear")), id="clearing"))
+    root = of(
+        "fallback", check(HEADS), clear, until(2, of("sequence", do("push"), ConditionNode("d", HEADS)))
+    )
+    assert simulate(stiff, root, Limits()).endless == 1
+    assert violations(stiff, explore(stiff, root, Limits())) == []
+    assert tries_without_end(root)
 
 
 def test_what_is_below_gets_its_attempts_back() -> None:

@@ -180,6 +180,7 @@ def test_attempts(rule: int, target: str, before: str, after: str) -> None:
 
 
 _TWICE = "sequence(try!!, again!!, won)"
+_PAIR = "sequence(try!!, again!!)"
 
 
 @pytest.mark.parametrize(
@@ -190,6 +191,7 @@ _TWICE = "sequence(try!!, again!!, won)"
         (2, f"fallback(won, {_TWICE}, {_TWICE}, {_TWICE}, c)", f"fallback(won, until3({_TWICE}), c)"),
         # What follows would be given up as soon as it runs: the node begins anew.
         (2, f"fallback(won, {_TWICE}, {_TWICE}, again!!)", None),
+        (2, f"fallback(won, sequence(fallback({_PAIR}, {_PAIR}), sure!!))", None),
         # In between the tick leaves the attempt, which would begin anew.
         (2, f"fallback(won, sequence(c, again!!, won), {_TWICE}, {_TWICE})", None),
         # Not neighbours.

@@ -34,6 +34,7 @@ TASK = task(
     action("unlock", TRUE, ("1", {OPEN: T})),
     action("charge", Is(LOW, T), ("1", {LOW: F})),
     action("wave", TRUE, ("1", {LOW: T})),
+    action("shake", TRUE, ("1", {SEEN: U})),
     action("wipe", TRUE, ("1", {CLEAN: T})),
 )
 
@@ -73,6 +74,7 @@ def names_of(root: Node) -> list[str | None]:
         (["known:seen not:given give", "not:low look"], ["for given()", "for known seen()"]),
         # A rule that ends what it reads does not want it.
         (["low charge", "not:given wave"], [None, None]),
+        (["known:seen shake", "not:low look"], [None, None]),
         # What holds already is not what it is for.
         (["not:given give", "here not:low go"], ["for given()", None]),
         # Nothing is said of an action alone.
