@@ -136,6 +136,8 @@ _CODES = (
     Code("BBT0502", "nothing left to insert before the target", _WARNING),
     Code("BBT0503", "option that the strategy does not know", exit=ExitStatus.USAGE),
     Code("BBT0504", "a tree would have more levels than one may have", exit=ExitStatus.LIMIT),
+    Code("BBT0505", "strategy that does not plan with hidden facts", exit=ExitStatus.USAGE),
+    Code("BBT0506", "hidden facts where they cannot be taken into account"),
     # 06xx: artefacts, and the shape of trees
     Code("BBT0601", "artefact is not valid JSON"),
     Code("BBT0602", "artefact of another format or version"),

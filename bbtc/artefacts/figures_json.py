@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bbtc.artefacts.conditions import condition_to_json
 from bbtc.artefacts.numbers import figure_text
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree

@@ -7,14 +7,14 @@ tool must read stays small.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of
+from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of, variable_from_json
 from bbtc.artefacts.cursor import At, Faults, clip, run_reader
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
@@ -26,12 +26,16 @@ from bbtc.ground.task import (
     BodyCondition,
     BodyControl,
     BodyTemplate,
+    Change,
     Charge,
+    Component,
     Effect,
     Factor,
     GroundAction,
     GroundTemplate,
     InitialState,
+    Knowledge,
+    Observation,
     Outcome,
     Signature,
     Task,
@@ -76,7 +80,9 @@ def task_to_json(task: Task) -> Json:
         for state in task.initial
     ]
     value["goal"] = condition_to_json(task.goal, task.variables)
-    value["actions"] = [_action_to_json(action, task.variables) for action in task.actions]
+    if task.components:
+        value["components"] = [_component_to_json(component, task) for component in task.components]
+    value["actions"] = [_action_to_json(action, task) for action in task.actions]
     if task.templates:
         value["templates"] = [_template_to_json(template, task.variables) for template in task.templates]
     if task.signatures:
@@ -93,15 +99,66 @@ def _variable_to_json(variable: Variable) -> Json:
     return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
 
 
-def _action_to_json(action: GroundAction, variables: Sequence[Variable]) -> Json:
-    return {
+def _component_to_json(component: Component, task: Task) -> Json:
+    local = component.local(task, component.seen)
+    value: Json = {
+        "facts": list(component.facts),
+        "prior": [
+            {
+                "p": given_text(probability),
+                "true": [fact for bit, fact in enumerate(component.facts) if world >> bit & 1],
+            }
+            for world, probability in component.prior
+        ],
+        "known": [_knowledge_to_json(knowledge, task, local) for knowledge in component.known],
+    }
+    if component.seen:
+        value["seen"] = [task.variables[variable].name for variable in component.seen]
+    if component.first:
+        value["first"] = [_observation_to_json(observation, local) for observation in component.first]
+    return value
+
+
+def _knowledge_to_json(knowledge: Knowledge, task: Task, local: Sequence[Variable]) -> Json:
+    value: Json = {
+        "variable": task.variables[knowledge.variable].name,
+        "condition": condition_to_json(knowledge.condition, local),
+    }
+    return value | ({"at_least": given_text(knowledge.at_least)} if knowledge.at_least != 1 else {})
+
+
+def _observation_to_json(observation: Observation, local: Sequence[Variable]) -> Json:
+    value: Json = {"condition": condition_to_json(observation.condition, local)}
+    if observation.when is not None:
+        value["when"] = condition_to_json(observation.when, local)
+    if observation.accuracy != 1:
+        value["accuracy"] = given_text(observation.accuracy)
+    return value
+
+
+def _change_to_json(change: Change, task: Task) -> Json:
+    local = task.components[change.component].local(task, change.seen)
+    value: Json = {"component": change.component}
+    if change.seen:
+        value["seen"] = [task.variables[variable].name for variable in change.seen]
+    value |= _chance_to_json(change.factors, local)
+    if change.observations:
+        value["observations"] = [_observation_to_json(each, local) for each in change.observations]
+    return value
+
+
+def _action_to_json(action: GroundAction, task: Task) -> Json:
+    value = {
         "name": action.name,
         "schema": action.schema,
         "args": list(action.args),
         "cost": given_text(action.cost),
-        "precondition": condition_to_json(action.precondition, variables),
-        **_chance_to_json(action.factors, variables),
+        "precondition": condition_to_json(action.precondition, task.variables),
+        **_chance_to_json(action.factors, task.variables),
     }
+    if action.changes:
+        value["changes"] = [_change_to_json(change, task) for change in action.changes]
+    return value
 
 
 def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
@@ -215,13 +272,16 @@ def read_task(at: At, faults: Faults) -> Task:
     check_header(at, FORMAT, VERSION)
     members = at.members(
         ["format", "version", "domain", "problem", "variables", "initial", "goal", "actions"],
-        ["goal_probability", "goal_reward", "metric", "templates", "signatures"],
+        ["goal_probability", "goal_reward", "metric", "templates", "signatures", "components"],
     )
     variables = faults.each(members["variables"].elements(), _variable)
     faults.stop_if_any()  # every mention of a variable would be a fault of its own
     variables.sort(key=lambda variable: variable.name)
     _check_distinct(members["variables"], [variable.name for variable in variables])
-    reader = _Reader(tuple(variables), {variable.name: i for i, variable in enumerate(variables)})
+    reader = _Reader.of(variables)
+    components = tuple(faults.each(_optional(members, "components"), reader.component))
+    faults.stop_if_any()  # changes name them by number
+    reader = replace(reader, components=components)
     actions = faults.each(members["actions"].elements(), reader.action)
     no_goal: Condition = TRUE
     task = Task(
@@ -249,6 +309,7 @@ def read_task(at: At, faults: Faults) -> Task:
                 faults.each(_optional(members, "signatures"), _signature), key=lambda s: (s.kind, s.symbol)
             )
         ),
+        components=components,
     )
     faults.stop_if_any()
     _check_sum(members["initial"], [state.probability for state in task.initial])
@@ -325,6 +386,72 @@ class _Reader:
 
     variables: tuple[Variable, ...]
     index: Mapping[str, int]
+    components: tuple[Component, ...] = ()
+
+    @classmethod
+    def of(cls, variables: Iterable[Variable]) -> _Reader:
+        """For some variables."""
+        listed = tuple(variables)
+        return cls(listed, {variable.name: number for number, variable in enumerate(listed)})
+
+    def component(self, at: At) -> Component:
+        members = at.members(["facts", "prior", "known"], ["seen", "first"])
+        facts, seen = _strings(members["facts"]), self._seen(members)
+        _check_distinct(members["facts"], sorted(facts))
+        local = self._local(facts, seen)
+        prior = tuple(self._world(each, local) for each in members["prior"].elements())
+        _check_sum(members["prior"], [probability for _, probability in prior])
+        known = sorted(
+            (self._knowledge(each, local) for each in members["known"].elements()),
+            key=lambda each: each.variable,
+        )
+        first = tuple(local.observation(each) for each in _optional(members, "first"))
+        return Component(facts, prior, tuple(known), first, seen)
+
+    def _knowledge(self, at: At, local: _Reader) -> Knowledge:
+        members = at.members(["variable", "condition"], ["at_least"])
+        variable = variable_from_json(members["variable"], self.index)
+        if not self.variables[variable].three_valued:
+            name = clip(self.variables[variable].name)
+            raise members["variable"].fault("BBT0604", f"variable '{name}' cannot be unknown")
+        at_least = members["at_least"].given_probability() if "at_least" in members else _ONE
+        if 2 * at_least <= 1:
+            raise members["at_least"].fault("BBT0604", "must be above 1/2, for one side to be believed")
+        return Knowledge(variable, local.condition(members["condition"]), at_least)
+
+    def _seen(self, members: Mapping[str, At]) -> tuple[int, ...]:
+        return tuple(variable_from_json(each, self.index) for each in _optional(members, "seen"))
+
+    def _local(self, facts: Sequence[str], seen: Sequence[int]) -> _Reader:
+        """Reads what refers to the local variables of a component."""
+        hidden = (Variable(*split_name(fact), three_valued=False, hidden=True) for fact in facts)
+        return _Reader.of((*hidden, *(self.variables[variable] for variable in seen)))
+
+    def _world(self, at: At, local: _Reader) -> tuple[int, Fraction]:
+        members = at.members(["p", "true"])
+        world = 0
+        for each in members["true"].elements():
+            world |= 1 << variable_from_json(each, local.index)
+        return world, members["p"].given_probability(zero=False)
+
+    def observation(self, at: At) -> Observation:
+        members = at.members(["condition"], ["when", "accuracy"])
+        return Observation(
+            self.condition(members["condition"]),
+            members["accuracy"].given_probability() if "accuracy" in members else _ONE,
+            self.condition(members["when"]) if "when" in members else None,
+        )
+
+    def change(self, at: At) -> Change:
+        members = at.members(["component"], ["seen", "outcomes", "factors", "oneof", "observations"])
+        number = members["component"].value
+        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(self.components):
+            message = f"must be the number of a component, below {len(self.components)}"
+            raise members["component"].fault("BBT0604", message)
+        seen = self._seen(members)
+        local = self._local(self.components[number].facts, seen)
+        observations = tuple(local.observation(each) for each in _optional(members, "observations"))
+        return Change(number, seen, local.chance(at, members), observations)
 
     def condition(self, at: At) -> Condition:
         return condition_from_json(at, self.index)
@@ -350,7 +477,7 @@ class _Reader:
 
     def action(self, at: At) -> GroundAction:
         members = at.members(
-            ["name", "schema", "args", "cost", "precondition"], ["outcomes", "factors", "oneof"]
+            ["name", "schema", "args", "cost", "precondition"], ["outcomes", "factors", "oneof", "changes"]
         )
         schema, args = members["schema"].string(), _strings(members["args"])
         _check_name(members["name"], schema, args)
@@ -360,6 +487,7 @@ class _Reader:
             self.condition(members["precondition"]),
             self.chance(at, members),
             members["cost"].given(),
+            tuple(self.change(each) for each in _optional(members, "changes")),
         )
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:

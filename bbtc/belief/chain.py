@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
-from bbtc.belief.state import Result, State, Transition, Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -67,7 +68,7 @@ def explore(
     steps = []
     for node in actions:
         if node.action not in transitions:
-            transitions[node.action] = compile_action(task.action_by_name[node.action], limits)
+            transitions[node.action] = compile_action(task, task.action_by_name[node.action], limits)
         steps.append(transitions[node.action])
     tick = compile_tick(task, root)
     memory = memory_of(root)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from bbtc.belief.chain import Chain
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.limits import Limits
 from bbtc.markov import distribution, reachable

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
-from bbtc.ground.condition import compile_condition
-from bbtc.ground.task import Effect, Factor, GroundAction, Outcome, Task
-from bbtc.kleene import Truth
+from bbtc.belief.draws import Draw, Values, compile_factor, product_of
+from bbtc.belief.hidden import compile_change, told_first
+from bbtc.ground.task import GroundAction, Task
 from bbtc.limits import Limits
 from bbtc.markov import distribution
-
-Values: TypeAlias = bytes
-"""The truth value of every variable of the task, by index."""
 
 
 class State(NamedTuple):
@@ -40,11 +37,14 @@ Transition: TypeAlias = Callable[[Values], tuple[Result, ...]]
 
 def initial_belief(task: Task) -> dict[Values, Fraction]:
     """The task's initial distribution over assignments, equal ones merged."""
-    return distribution((bytes(initial.values), initial.probability) for initial in task.initial)
-
-
-_Delta: TypeAlias = tuple[tuple[int, int], ...]
-_Draw: TypeAlias = tuple[_Delta, Fraction, Fraction]  # sets, cost, reward
+    own = distribution((bytes(initial.values), initial.probability) for initial in task.initial)
+    if not task.components:
+        return own
+    return distribution(
+        (after, probability * p)
+        for values, p in own.items()
+        for after, probability in told_first(task, values)
+    )
 
 
 _LOOK = 4096  # combinations of outcomes between two looks at the clock
@@ -67,25 +67,27 @@ class _Bounded:
             self._limits.check_time("working out what an action leads to")
 
 
-def compile_action(action: GroundAction, limits: Limits) -> Transition:
-    """The action as a function from values to its results: equal results merged, most probable
+def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transition:
+    """An action of the task as a function from values to its results: equal results merged, most probable
     first (ties by values). Results are cached per assignment. The function raises
     :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on states, or
     for longer than time and memory allow."""
     bounded = _Bounded(limits)
-    drawers = [_compile_factor(factor, bounded) for factor in action.factors]
+    drawers = [compile_factor(factor, bounded.spend) for factor in action.factors]
+    if action.changes:
+        drawers += [compile_change(task, change, bounded.spend) for change in action.changes]
     cache: dict[Values, tuple[Result, ...]] = {}
 
     def results(values: Values) -> tuple[Result, ...]:
         known = cache.get(values)
         if known is None:
-            known = cache[values] = _results(values, action.cost, _product(values, drawers, bounded))
+            known = cache[values] = _results(values, action.cost, product_of(values, drawers, bounded.spend))
         return known
 
     return results
 
 
-def _results(values: Values, cost: Fraction, draws: dict[_Draw, Fraction]) -> tuple[Result, ...]:
+def _results(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> tuple[Result, ...]:
     merged: dict[tuple[Values, Fraction, Fraction], Fraction] = {}
     for (delta, extra, reward), probability in draws.items():
         if not probability:
@@ -97,93 +99,3 @@ def _results(values: Values, cost: Fraction, draws: dict[_Draw, Fraction]) -> tu
         merged[key] = merged.get(key, Fraction(0)) + probability
     results = [Result(p, c, r, v) for (v, c, r), p in merged.items()]
     return tuple(sorted(results, key=lambda r: (-r.probability, r.values, r.cost, r.reward)))
-
-
-_Drawer: TypeAlias = Callable[[Values], dict[_Draw, Fraction]]
-_Amounts: TypeAlias = Callable[[Values], tuple[Fraction, Fraction]]  # cost, reward
-
-
-def _product(values: Values, drawers: Iterable[_Drawer], bounded: _Bounded) -> dict[_Draw, Fraction]:
-    """Independent draws combined: sets united (the Kleene maximum where they clash), costs and
-    rewards added, equal combinations merged at once so that only distinct results multiply."""
-    total: dict[_Draw, Fraction] = {((), Fraction(0), Fraction(0)): Fraction(1)}
-    for drawer in drawers:
-        drawn = drawer(values)
-        combined: dict[_Draw, Fraction] = {}
-        for (delta, cost, reward), p in total.items():
-            for (delta2, cost2, reward2), p2 in drawn.items():
-                key = (_unite(delta, delta2), cost + cost2, reward + reward2)
-                combined[key] = combined.get(key, Fraction(0)) + p * p2
-            bounded.spend(len(drawn), len(combined))
-        total = combined
-    return total
-
-
-def _unite(first: _Delta, second: _Delta) -> _Delta:
-    if not first or not second:
-        return first or second
-    united = dict(first)
-    for variable, value in second:
-        united[variable] = max(value, united.get(variable, Truth.FALSE))
-    return tuple(sorted(united.items()))
-
-
-def _compile_factor(factor: Factor, bounded: _Bounded) -> _Drawer:
-    outcomes = [
-        (
-            o.probability,
-            _compile_amounts(o),
-            _compile_effects(o.effects),
-            [_compile_factor(f, bounded) for f in o.factors],
-        )
-        for o in factor.outcomes
-    ]
-
-    def draw(values: Values) -> dict[_Draw, Fraction]:
-        drawn: dict[_Draw, Fraction] = {}
-        for probability, amounts, effects, nested in outcomes:
-            delta, (cost, reward) = effects(values), amounts(values)
-            product = _product(values, nested, bounded)
-            for (delta2, cost2, reward2), p in product.items():
-                key = (_unite(delta, delta2), cost + cost2, reward + reward2)
-                drawn[key] = drawn.get(key, Fraction(0)) + probability * p
-            bounded.spend(len(product), len(drawn))
-        return drawn
-
-    return draw
-
-
-def _compile_amounts(outcome: Outcome) -> _Amounts:
-    """What an outcome adds to cost and reward."""
-    certain = outcome.cost, outcome.reward
-    if not outcome.charges:
-        return lambda _values: certain
-    guarded = [(compile_condition(charge.when), charge) for charge in outcome.charges]
-
-    def amounts(values: Values) -> tuple[Fraction, Fraction]:
-        due = [charge for guard, charge in guarded if guard(values) == Truth.TRUE]
-        cost = sum((charge.cost for charge in due), certain[0])
-        return cost, sum((charge.reward for charge in due), certain[1])
-
-    return amounts
-
-
-def _compile_effects(effects: tuple[Effect, ...]) -> Callable[[Values], _Delta]:
-    always = _sets(s for e in effects if e.when is None for s in e.sets)
-    guarded = [(compile_condition(e.when), _sets(e.sets)) for e in effects if e.when is not None]
-
-    def delta(values: Values) -> _Delta:
-        united = always
-        for guard, sets in guarded:
-            if guard(values) == Truth.TRUE:
-                united = _unite(united, sets)
-        return united
-
-    return delta
-
-
-def _sets(sets: Iterable[tuple[int, Truth]]) -> _Delta:
-    united: dict[int, int] = {}
-    for variable, value in sets:
-        united[variable] = max(int(value), united.get(variable, 0))
-    return tuple(sorted(united.items()))

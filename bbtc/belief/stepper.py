@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-from bbtc.belief.state import State, Transition, Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import State, Transition, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, Memory, NodeStatus, Tick, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -117,7 +118,7 @@ class Stepper:
         action = self._actions[self._memory.action(returned)]
         if action.action not in self._transitions:
             ground = self.task.action_by_name[action.action]
-            self._transitions[action.action] = compile_action(ground, self.limits)
+            self._transitions[action.action] = compile_action(self.task, ground, self.limits)
         results = self._transitions[action.action](state.values)
         after = distribution((result.values, result.probability) for result in results)
         remembered = self._memory.after(state.finished, returned)

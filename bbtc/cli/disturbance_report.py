@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from bbtc.artefacts.numbers import exact
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.cli.counting import counted
 from bbtc.cli.wording import stopped
 from bbtc.disturbance.intervals import Interval

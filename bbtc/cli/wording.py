@@ -31,7 +31,7 @@ _MOST_STEPS = 12  # actions told of one run
 
 def changes(tree: Tree, before: bytes, after: bytes) -> str:
     """``seen(soda) = true, …``: the variables that differ, with their new values."""
-    pairs = zip(tree.task.variables, before, after, strict=True)
+    pairs = zip(tree.task.variables, before, after, strict=False)  # behind them: what is believed
     changed = [f"{variable.name} = {Truth(new).word}" for variable, old, new in pairs if old != new]
     return printable(", ".join(changed)) or "no change"
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from bbtc.belief.state import Result, Transition, Values, compile_action
+from bbtc.belief.draws import Values
+from bbtc.belief.state import Result, Transition, compile_action
 from bbtc.ground.condition import compile_condition
 from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth
@@ -20,11 +21,11 @@ def careful_actions(task: Task, root: Node, limits: Limits) -> dict[str, Transit
     """The actions of a tree by name, as functions that raise :class:`bbtc.diagnostics.LimitReached` where
     there is too much that an action may lead to."""
     names = dict.fromkeys(node.action for node in actions_of(root))
-    return {name: _careful(task.action_by_name[name], limits) for name in names}
+    return {name: _careful(task, task.action_by_name[name], limits) for name in names}
 
 
-def _careful(action: GroundAction, limits: Limits) -> Transition:
-    ready, run = compile_condition(action.precondition), compile_action(action, limits)
+def _careful(task: Task, action: GroundAction, limits: Limits) -> Transition:
+    ready, run = compile_condition(action.precondition), compile_action(task, action, limits)
 
     def results(values: Values) -> tuple[Result, ...]:
         if ready(values) == Truth.TRUE:

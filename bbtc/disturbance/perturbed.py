@@ -15,7 +15,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
-from bbtc.belief.state import Values, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.intervals import Interval, wilson

@@ -18,8 +18,8 @@ import numpy as np
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
+from bbtc.belief.draws import Values
 from bbtc.belief.failures import FailureFinder
-from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.intervals import Interval, score, wilson

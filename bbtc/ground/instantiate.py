@@ -190,6 +190,7 @@ class _TaskBuilder:
                 found,
                 [factors or _NO_FACTORS for factors, _ in done],
                 map(itemgetter(1), done) if counts_cost else repeat(unit),
+                repeat(()),
                 repeat(schema.span),
             )
         return made

@@ -6,7 +6,7 @@ and costs are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -94,17 +94,88 @@ class Factor:
     oneof: bool = False
 
 
+# --- what is hidden --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """The robot is told whether ``condition`` is true, if ``when`` is (None: always): rightly with
+    probability ``accuracy``, whichever the truth, and else wrongly. Both are read in the state after the
+    action; they are two-valued there."""
+
+    condition: Condition
+    accuracy: Fraction = Fraction(1)
+    when: Condition | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What an action does to the hidden facts of a component, and what the robot is told of them.
+
+    Conditions and effects refer to *local* variables: first the facts of the component
+    (:attr:`Component.facts`), which are two-valued in each world, then the task's variables of
+    :attr:`seen`. One outcome of every factor happens, unseen, but for what it sets of the seen variables.
+    """
+
+    component: int
+    seen: tuple[int, ...]
+    factors: tuple[Factor, ...]
+    observations: tuple[Observation, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Knowledge:
+    """A three-valued variable of the task tells what is believed of a condition over the facts of a component
+    (local variables, as in :class:`Change`): it is true where the condition is so with a probability of
+    ``at_least``, false where it is false with that, and else unknown. With 1, the default, it tells what is
+    known: what holds in all worlds still possible. ``at_least`` is above 1/2."""
+
+    variable: int
+    condition: Condition
+    at_least: Fraction = Fraction(1)
+
+
+@dataclass(frozen=True)
+class Component:
+    """Hidden facts whose draws or changes depend on each other.
+
+    A *world* is a truth value for each fact, as a number: bit i is set where fact i is true. ``prior`` has
+    every possible world with its probability. ``known`` are the task's variables that tell what is known.
+    ``first`` is what the robot is told before its first action; ``seen`` are the task's variables behind the
+    facts in the local variables of that.
+    """
+
+    facts: tuple[str, ...]
+    prior: tuple[tuple[int, Fraction], ...]
+    known: tuple[Knowledge, ...]
+    first: tuple[Observation, ...] = ()
+    seen: tuple[int, ...] = ()
+
+    def local(self, task: Task, seen: Sequence[int]) -> tuple[Variable, ...]:
+        """The local variables: a two-valued one for each fact, then the seen variables of the task."""
+        facts = (Variable(*split_name(fact), three_valued=False, hidden=True) for fact in self.facts)
+        return (*facts, *(task.variables[variable] for variable in seen))
+
+    @cached_property
+    def memo(self) -> dict[str, object]:
+        """What others work out of it once, and keep: it goes where the component goes, to other processes,
+        too."""
+        return {}
+
+
 @dataclass(frozen=True, slots=True)
 class GroundAction:
     """A schema with its arguments. One outcome of every factor happens, independently; all
     conditions are read before any effect. Where effects of one occurrence set a variable to
-    different values, the Kleene maximum wins (delete before forget before add)."""
+    different values, the Kleene maximum wins (delete before forget before add). ``changes`` tells what
+    happens to hidden facts, at most one a component, independently of each other and of the factors."""
 
     schema: str
     args: tuple[str, ...]
     precondition: Condition
     factors: tuple[Factor, ...]
     cost: Fraction = Fraction(1)
+    changes: tuple[Change, ...] = ()
     span: Span | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -203,6 +274,9 @@ class Task:
     goal_reward: Fraction = Fraction(0)
     metric: Literal["cost", "reward"] = "cost"
     signatures: tuple[Signature, ...] = ()
+    components: tuple[Component, ...] = ()
+    """What is hidden from the robot. The variables that a component's ``known`` names are set by nothing
+    else, and have in the initial states the value that the prior gives them before anything is told."""
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property
@@ -250,6 +324,26 @@ def effects_of(factors: Iterable[Factor]) -> Iterator[Effect]:
 def charges_of(factors: Iterable[Factor]) -> Iterator[Charge]:
     """Every charge that some occurrence of the factors can make."""
     return (charge for outcome in outcomes_of(factors) for charge in outcome.charges)
+
+
+def apparent_factors(task: Task, doing: GroundAction | GroundTemplate) -> tuple[Factor, ...]:
+    """The factors of an action or a guide and, for what it does to hidden facts, all that it might make seen
+    or known: more than can be, with no probabilities of their own, for what relaxes the task."""
+    if not isinstance(doing, GroundAction) or not doing.changes:
+        return doing.factors
+    found = list(doing.factors)
+    for change in doing.changes:
+        component = task.components[change.component]
+        facts = len(component.facts)
+        for effect in effects_of(change.factors):
+            sets = ((local - facts, value) for local, value in effect.sets if local >= facts)
+            if seen := tuple((change.seen[at], value) for at, value in sets):
+                found.append(Factor((Outcome(ONE, (Effect(None, seen),)),)))
+        third = Fraction(1, 3)
+        for knowledge in component.known:
+            maybe = (Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth)
+            found.append(Factor(tuple(maybe)))
+    return tuple(found)
 
 
 def walk_body(body: Body) -> Iterator[Body]:

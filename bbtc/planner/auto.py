@@ -30,8 +30,8 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from bbtc.belief.chain import explore
+from bbtc.belief.draws import Values
 from bbtc.belief.simulate import figures, success_of
-from bbtc.belief.state import Values
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -163,7 +163,7 @@ class _Auto:
                 self.add(step())
         if not self.interrupted:
             self.add(self.refinement(refined))
-        if not self.interrupted and not options.closed_world:
+        if not self.interrupted and not options.closed_world and not task.components:
             with suppress(LimitReached):
                 self.go_on_from_elsewhere()
 
@@ -256,7 +256,7 @@ class _Auto:
 
     def surely(self) -> Plan | None:
         """A policy over partial states, unless there is none that surely reaches the goal."""
-        if self.upper < 1:
+        if self.upper < 1 or self.task.components:
             return None
         limits = self.limits.part(_SURE_SHARE)
         if self.met:

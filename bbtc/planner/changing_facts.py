@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from bbtc.belief.state import Values
-from bbtc.ground.task import Task, effects_of
+from bbtc.belief.draws import Values
+from bbtc.ground.task import Task, apparent_factors, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mutexes import Group, exclusive_groups
@@ -146,7 +146,7 @@ def _values(task: Task) -> list[tuple[Truth, ...]]:
         for own, value in zip(found, initial.values, strict=True):
             own.add(value)
     for action in task.actions:
-        for effect in effects_of(action.factors):
+        for effect in effects_of(apparent_factors(task, action)):
             for variable, value in effect.sets:
                 found[variable].add(value)
     return [

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from bbtc.belief.state import Values, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import initial_belief
 from bbtc.ground.task import InitialState, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits

@@ -28,12 +28,14 @@ class Strategy(Protocol):
 @dataclass(frozen=True, slots=True)
 class Entry:
     """Module and function of a strategy, imported when used, and which options it knows: ``max_actions`` is
-    refused where it does not; ``retries`` changes nothing there."""
+    refused where it does not; ``retries`` changes nothing there. ``hidden``: does it plan with hidden
+    facts?"""
 
     module: str
     function: str
     max_actions: bool = False
     retries: bool = False
+    hidden: bool = True
 
     def load(self) -> Strategy:
         """The strategy."""
@@ -45,7 +47,7 @@ STRATEGIES = {
     "refine": Entry("bbtc.planner.chaining.refine", "refine"),
     "search": Entry("bbtc.planner.chaining.search", "plan_search", retries=True),
     "policy": Entry("bbtc.planner.synthesis.policy", "plan_policy", max_actions=True, retries=True),
-    "strong-cyclic": Entry("bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic"),
+    "strong-cyclic": Entry("bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic", hidden=False),
     "auto": Entry("bbtc.planner.auto", "plan_auto", max_actions=True, retries=True),
     "advised": Entry("bbtc.planner.auto", "plan_advised", max_actions=True, retries=True),
 }
@@ -77,6 +79,12 @@ def run_strategy(
 ) -> Plan:
     """Plan with a strategy, but for guards. Raises :class:`BbtcError` as :func:`require_strategy` does."""
     require_strategy(name, options)
+    if task.components and not STRATEGIES[name].hidden:
+        raise BbtcError.single(
+            "BBT0505",
+            f"the strategy '{name}' does not plan with hidden facts",
+            hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.hidden)}",
+        )
     if not options.closed_world:
         from bbtc.planner.guard import most_more
 

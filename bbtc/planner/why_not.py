@@ -14,14 +14,14 @@ from typing_extensions import assert_never
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
+from bbtc.belief.draws import Values
 from bbtc.belief.scenarios import Scenario, scenarios
-from bbtc.belief.state import Values
 from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts
 from bbtc.ground.describe import describe
 from bbtc.ground.repair import Every, Need, Repairs, Root, Some, Way, every, some
-from bbtc.ground.task import Effect, GroundAction, Task, effects_of
+from bbtc.ground.task import Effect, GroundAction, Task, apparent_factors, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.h_add import Facts, Relaxation, possible
@@ -124,7 +124,7 @@ class RootFinder:
         self._relaxed = Relaxation(task, limits)
         self._makers: dict[_Fact, list[tuple[GroundAction, Effect]]] = {}
         for action in task.actions:
-            for effect in effects_of(action.factors):
+            for effect in effects_of(apparent_factors(task, action)):
                 for fact in effect.sets:
                     self._makers.setdefault(fact, []).append((action, effect))
 

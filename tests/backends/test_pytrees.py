@@ -312,6 +312,6 @@ def test_the_simulated_world_has_exactly_the_distribution_of_the_task(seed: int)
             return tuple(TRUTH[(state | changes)[fact]] for fact in facts)
 
         wanted: dict[tuple[int, ...], Fraction] = {}
-        for result in compile_action(action, Limits())(bytes(before)):
+        for result in compile_action(task, action, Limits())(bytes(before)):
             wanted[tuple(result.values)] = wanted.get(tuple(result.values), Fraction(0)) + result.probability
         assert distribution(after) == wanted

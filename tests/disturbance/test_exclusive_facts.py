@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 import bbtc
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.ground.condition import TRUE, Condition, Is, conjunction
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth

@@ -6,7 +6,8 @@ checking" (2003): take away what can no longer stay within the rest and reach th
 
 from __future__ import annotations
 
-from bbtc.belief.state import Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import compile_action, initial_belief
 from bbtc.ground.condition import evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -15,7 +16,7 @@ from bbtc.limits import Limits
 
 def strong_cyclic_states(task: Task) -> tuple[set[Values], set[Values]]:
     """All states that are reachable, and those of them from which some policy reaches the goal for sure."""
-    transitions = [(action.precondition, compile_action(action, Limits())) for action in task.actions]
+    transitions = [(action.precondition, compile_action(task, action, Limits())) for action in task.actions]
     states = list(initial_belief(task))
     moves: dict[Values, list[frozenset[Values]]] = {}
     for state in states:

@@ -11,7 +11,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bbtc.belief.state import Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import compile_action, initial_belief
 from bbtc.ground.condition import TRUE, Is, conjunction, evaluate
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
@@ -30,7 +31,7 @@ Step = tuple[str, Values, Fraction, Fraction]
 
 def by_simulator(task: Task) -> dict[Values, dict[Step, Fraction]]:
     """Reachable states and the results of every choice that may leave its state."""
-    steps = {action.name: compile_action(action, Limits()) for action in task.actions}
+    steps = {action.name: compile_action(task, action, Limits()) for action in task.actions}
     found: dict[Values, dict[Step, Fraction]] = {}
     todo = list(initial_belief(task))
     while todo:

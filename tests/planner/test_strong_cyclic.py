@@ -88,7 +88,7 @@ def test_what_is_learnt_of_dead_ends_and_invariants_is_true_of_every_reachable_s
             if evaluate(action.precondition, values) is Truth.TRUE and solver.forbidden.forbids(
                 state, number
             ):
-                results = compile_action(action, Limits())(values)
+                results = compile_action(of, action, Limits())(values)
                 assert not {result.values for result in results} <= safe
 
 
@@ -102,7 +102,7 @@ def test_steps_are_those_of_the_simulator_and_regression_is_enough(of: Task, ran
     ordered = sorted(reachable)[:40]
     packed = [model.packing.pack(values) for values in ordered]
     for action in model.actions:
-        transition = compile_action(of.actions[action.number], Limits())
+        transition = compile_action(of, of.actions[action.number], Limits())
         for values, state in zip(ordered, packed, strict=True):
             if evaluate(of.actions[action.number].precondition, values) is not Truth.TRUE:
                 assert action.number not in model.applicable(state)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.diagnostics import BbtcError, LimitReached
 from bbtc.ground.condition import And, Is
 from bbtc.ground.task import Task

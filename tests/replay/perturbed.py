@@ -11,7 +11,8 @@ from collections.abc import Hashable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from bbtc.belief.state import Values, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import initial_belief
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.perturbed import Draw, bits_of, threshold
 from bbtc.ground.condition import evaluate

@@ -238,5 +238,5 @@ def _state(tree: Tree, values: bytes) -> str:
     from bbtc.kleene import Truth
     from bbtc.printable import printable
 
-    pairs = zip(tree.task.variables, values, strict=True)
+    pairs = zip(tree.task.variables, values, strict=False)  # behind them: what is believed
     return printable(", ".join(f"{variable.name} = {Truth(value).word}" for variable, value in pairs))

@@ -13,9 +13,10 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.belief.state import State, Transition, Values, compile_action
+from bbtc.belief.draws import Values
+from bbtc.belief.state import State, Transition, compile_action
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts, evaluate, variables
-from bbtc.ground.task import GroundAction, Task, effects_of
+from bbtc.ground.task import GroundAction, Task, apparent_factors, effects_of
 from bbtc.kleene import Truth, negate
 from bbtc.limits import Limits
 from bbtc.planner.chaining.draft import Doing, Subgoal, changed_by
@@ -97,7 +98,8 @@ class Chooser:
         self._helps: dict[tuple[Subgoal, _Tried, Truth, Values, frozenset[str]], bool] = {}
         doings: list[Doing] = [*task.actions, *task.templates]
         for doing in doings:
-            for fact in sorted({fact for effect in effects_of(doing.factors) for fact in effect.sets}):
+            effects = effects_of(apparent_factors(task, doing))
+            for fact in sorted({fact for effect in effects for fact in effect.sets}):
                 self._by_fact.setdefault(fact, []).append(doing)
 
     def helps(self, flaw: Flaw) -> bool:
@@ -144,7 +146,7 @@ class Chooser:
             inserted = self._inserted(doing, conditions)
             yield Candidate(doing, inserted, *chances, _unmet(conditions, states), tried)
             return
-        for guard in _guards(doing, frozenset(variables(goal))):
+        for guard in _guards(self.task, doing, frozenset(variables(goal))):
             more = (*conditions, *(c for c in conjuncts(guard) if c not in conditions))
             if any(circular(c, goal, flaw.value) for c in more):
                 continue
@@ -201,7 +203,7 @@ class Chooser:
                 action = doing
             else:
                 action = GroundAction(doing.template, doing.args, doing.precondition, doing.factors)
-            store[doing.name] = compile_action(action, self.limits)
+            store[doing.name] = compile_action(self.task, action, self.limits)
         return store[doing.name]
 
     def _parts(self, flaw: Flaw) -> Iterator[Candidate]:
@@ -267,11 +269,11 @@ def circular(condition: Condition, goal: Condition, value: Truth) -> bool:
     )
 
 
-def _guards(doing: Doing, wanted: frozenset[int]) -> list[Condition]:
+def _guards(task: Task, doing: Doing, wanted: frozenset[int]) -> list[Condition]:
     """The guards of the effects on some variables, each once."""
     guards = (
         effect.when
-        for effect in effects_of(doing.factors)
+        for effect in effects_of(apparent_factors(task, doing))
         if any(variable in wanted for variable, _ in effect.sets)
     )
     return list(dict.fromkeys(guard for guard in guards if guard is not None))

@@ -45,6 +45,7 @@ from bbtc.ground.task import (
     GroundAction,
     GroundTemplate,
     Task,
+    apparent_factors,
     effects_of,
 )
 from bbtc.kleene import Truth
@@ -164,12 +165,13 @@ def actions_in(task: Task, body: Body) -> Iterator[GroundAction]:
 
 def changed_by(task: Task, body: Body) -> frozenset[int]:
     """Variables that the actions of a template body can change."""
-    return frozenset().union(*(changes(action) for action in actions_in(task, body)))
+    return frozenset().union(*(changes(task, action) for action in actions_in(task, body)))
 
 
-def changes(action: GroundAction) -> frozenset[int]:
+def changes(task: Task, action: GroundAction) -> frozenset[int]:
     """Variables that an action can change."""
-    return frozenset(variable for effect in effects_of(action.factors) for variable, _ in effect.sets)
+    effects = effects_of(apparent_factors(task, action))
+    return frozenset(variable for effect in effects for variable, _ in effect.sets)
 
 
 class _Freezer:

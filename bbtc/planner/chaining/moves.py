@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.ground.condition import And, Condition, Is, Or, conjuncts, evaluate, negation, variables
 from bbtc.ground.task import GroundAction, Task
 from bbtc.kleene import Truth

@@ -30,8 +30,9 @@ from itertools import count
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
+from bbtc.belief.draws import Values
 from bbtc.belief.failures import FailureFinder
-from bbtc.belief.state import Transition, Values, compile_action
+from bbtc.belief.state import Transition, compile_action
 from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import evaluate
@@ -264,7 +265,7 @@ class _Search:
             return Fraction(1), Fraction(0)
         name = insertion.doing.name
         if name not in self.transitions:
-            self.transitions[name] = compile_action(insertion.doing, self.limits)
+            self.transitions[name] = compile_action(self.task, insertion.doing, self.limits)
         chance = opened = Fraction(0)
         for result in self.transitions[name](insertion.started(values)):
             after = evaluate(insertion.subgoal.condition, result.values)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bbtc.ground.condition import evaluate
-from bbtc.ground.task import Effect, GroundAction, GroundTemplate, Task, effects_of
+from bbtc.ground.task import Effect, GroundAction, GroundTemplate, Task, apparent_factors, effects_of
 from bbtc.kleene import Truth
 from bbtc.planner.chaining.choose import Flaw
 from bbtc.planner.chaining.draft import Attempt, Draft, Subgoal, actions_in
@@ -83,10 +83,10 @@ def _effects(task: Task, attempt: Attempt) -> Iterator[Effect]:
     """Everything an attempt can do; of a template, what the actions of its body do."""
     match attempt.doing:
         case GroundAction():
-            yield from effects_of(attempt.doing.factors)
+            yield from effects_of(apparent_factors(task, attempt.doing))
         case GroundTemplate():
             for action in actions_in(task, attempt.doing.body):
-                yield from effects_of(action.factors)
+                yield from effects_of(apparent_factors(task, action))
         case None:
             return
 

@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import assert_never
 
-from bbtc.belief.state import Values
+from bbtc.belief.draws import Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.task import Factor, Task
+from bbtc.ground.task import Factor, Task, apparent_factors
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import Packing, Words
@@ -108,7 +108,7 @@ class Relaxation:
             cost, dearest = max(rounded(action.cost), _LEAST_COST), _NEVER
             if count_actions:
                 cost, dearest = 1.0, _DEAREST
-            for operator in operators_of(number, action.factors):
+            for operator in operators_of(number, apparent_factors(task, action)):
                 more = [] if operator.when is None else self._body(operator.when)
                 heads = [3 * variable + int(value) for variable, value in operator.sets]
                 weight = min(dearest, cost / max(_LEAST_PROBABILITY, float(operator.probability)))
@@ -168,7 +168,8 @@ class Relaxation:
         if values in self._cache:
             return self._cache[values]
         costs: Costs = np.full(self._count, np.inf, dtype=self._dtype)
-        costs[3 * np.arange(len(values)) + np.frombuffer(values, dtype=np.uint8)] = 0
+        count = len(self.task.variables)
+        costs[3 * np.arange(count) + np.frombuffer(values, dtype=np.uint8, count=count)] = 0
         costs[self._always] = 0
         while (least := self._backup(costs)) is not None:
             costs[self._added] = least

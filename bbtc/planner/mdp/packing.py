@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.belief.state import Values
+from bbtc.belief.draws import PLACES, Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
@@ -19,6 +19,8 @@ if TYPE_CHECKING:  # a strategy that keeps states as integers loads no NumPy
     import numpy.typing as npt
 
 WORD = 64
+BELIEF = 8 * PLACES
+"""Bits that the number of a belief takes."""
 Words: TypeAlias = "npt.NDArray[np.uint64]"
 """Packed states, a row each."""
 Flags: TypeAlias = "npt.NDArray[np.bool_]"
@@ -40,21 +42,28 @@ class Packing:
 
     unknown: tuple[int | None, ...]
     words: int
+    beliefs: int = 0
+    """Components of hidden facts: the numbers of what is believed of them stand behind the variables."""
     _three_valued: tuple[int, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         three_valued = tuple(v for v, at in enumerate(self.unknown) if at is not None)
         object.__setattr__(self, "_three_valued", three_valued)
 
+    @property
+    def _first_belief(self) -> int:
+        return len(self.unknown) + len(self._three_valued)
+
     @classmethod
     def of(cls, task: Task) -> Packing:
         """The layout for a task: true bits first, by variable, then the unknown bits."""
         at = len(task.variables)
+        beliefs = len(task.components)
         unknown: list[int | None] = []
         for variable in task.variables:
             unknown.append(at if variable.three_valued else None)
             at += variable.three_valued
-        return cls(tuple(unknown), max(1, -(-at // WORD)))
+        return cls(tuple(unknown), max(1, -(-(at + BELIEF * beliefs) // WORD)), beliefs)
 
     def owner(self, bit: int) -> int:
         """The variable that a bit belongs to."""
@@ -79,7 +88,10 @@ class Packing:
 
     def pack(self, values: Values) -> int:
         """The bits of a state."""
-        packed = int(values[::-1].translate(_TRUE_AS_ONE) or b"0", 2)
+        count = len(self.unknown)
+        packed = int(values[:count][::-1].translate(_TRUE_AS_ONE) or b"0", 2)
+        if self.beliefs:
+            packed |= int.from_bytes(values[count:], "big") << self._first_belief
         for variable in self._three_valued:
             if values[variable] == Truth.UNKNOWN:
                 packed |= self.assigned(variable, Truth.UNKNOWN)
@@ -118,7 +130,12 @@ class Packing:
 
     def values(self, states: Words, row: int) -> Values:
         """One state as the rest of the program keeps it."""
-        return bytes(self.unpack(states[row : row + 1])[0].tolist())
+        values = bytes(self.unpack(states[row : row + 1])[0].tolist())
+        if not self.beliefs:
+            return values
+        bits = int.from_bytes(states[row].astype("<u8").tobytes(), "little") >> self._first_belief
+        beliefs = bits & (1 << BELIEF * self.beliefs) - 1
+        return values + beliefs.to_bytes(PLACES * self.beliefs, "big")
 
 
 def set_bits(bits: int) -> Iterator[int]:

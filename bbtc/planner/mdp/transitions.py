@@ -107,7 +107,7 @@ class ActionTables:
     guard_value: Words = field(init=False)
     guard_masks: tuple[Words, Words, Words, Words] = field(init=False)
     by_reference: dict[int, Transition] = field(init=False, default_factory=dict)
-    """Actions with too many joint outcomes, as the simulator runs them."""
+    """Actions with too many joint outcomes, or that change what is believed, as the simulator runs them."""
     _charges: dict[int, tuple[tuple[BitTest, Charge], ...]] = field(init=False, default_factory=dict)
     """By outcome: what it adds to cost and reward under conditions."""
     _draw_index: dict[Draw, int] = field(init=False, default_factory=dict)
@@ -147,10 +147,10 @@ class ActionTables:
         first, count = [], []
         for number, action in enumerate(self.task.actions):
             first.append(len(base))
-            joint = _joint(action.factors)
+            joint = None if action.changes else _joint(action.factors)
             rows = None if joint is None else [self._outcome(effects) for effects, *_ in joint]
             if joint is None or rows is None or any(row is None for row in rows):
-                self.by_reference[number] = compile_action(action, self.limits)
+                self.by_reference[number] = compile_action(self.task, action, self.limits)
                 count.append(0)
                 continue
             for row, ((_, cost, reward, charges), probability) in zip(rows, joint.items(), strict=True):

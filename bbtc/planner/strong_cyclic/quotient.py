@@ -17,7 +17,8 @@ from typing import TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.belief.chain import Chain, Edge
-from bbtc.belief.state import State, Values, compile_action, initial_belief
+from bbtc.belief.draws import Values
+from bbtc.belief.state import State, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus
 from bbtc.ground.condition import Condition, variables
 from bbtc.ground.task import Task, charges_of
@@ -47,7 +48,7 @@ def quotient_chain(
     for state in belief:
         visit.all_from(state)
     number = {state: index for index, state in enumerate(visit.nodes)}
-    transitions = [compile_action(task.action_by_name[node.action], limits) for node in ticks.nodes]
+    transitions = [compile_action(task, task.action_by_name[node.action], limits) for node in ticks.nodes]
 
     def edges_of(values: Values, choice: int) -> tuple[Edge, ...]:
         return tuple(

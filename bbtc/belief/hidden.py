@@ -1,0 +1,248 @@
+"""What is believed of hidden facts: distributions over the worlds of a component, and how actions and
+what the robot is told change them (Bayes' rule, exactly).
+
+Beliefs of a component are numbered as they first appear; a number stands for its belief wherever the
+component goes. A belief is what the robot could know by all it was told: how likely each world is that is
+still possible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import reduce
+from math import gcd, lcm
+from typing import TypeAlias
+
+from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
+from bbtc.ground.condition import TRUE, compile_condition
+from bbtc.ground.task import Change, Component, Observation, Task
+from bbtc.kleene import Truth
+from bbtc.markov import distribution
+
+Belief: TypeAlias = tuple[tuple[int, int], ...]
+"""Worlds still possible, in order, with weights: positive integers without a common divisor."""
+
+
+@dataclass(slots=True)
+class Beliefs:
+    """The beliefs of a component that were met, by number, and what is known in each."""
+
+    component: Component
+    by_number: list[Belief] = field(default_factory=list)
+    _numbers: dict[Belief, int] = field(default_factory=dict)
+    _known: list[Delta] = field(default_factory=list)
+    _true: dict[int, tuple[int, ...]] = field(default_factory=dict)
+    """By world: which of the conditions of :attr:`Component.known` are true."""
+
+    def number(self, weights: Iterable[tuple[int, Fraction]]) -> int:
+        """The number of the belief with these weights of worlds, which need not sum to 1."""
+        belief = _lowest(weights)
+        found = self._numbers.get(belief)
+        if found is None:
+            found = self._numbers[belief] = len(self.by_number)
+            self.by_number.append(belief)
+            self._known.append(self._known_in(belief))
+        return found
+
+    def known(self, number: int) -> Delta:
+        """The task's variables that tell what is known, and their values in a belief."""
+        return self._known[number]
+
+    def _known_in(self, belief: Belief) -> Delta:
+        true = [0] * len(self.component.known)
+        for world, weight in belief:
+            for at in self._true_in(world):
+                true[at] += weight
+        total = sum(weight for _, weight in belief)
+        return tuple(
+            (knowledge.variable, int(_believed(weight, total, knowledge.at_least)))
+            for knowledge, weight in zip(self.component.known, true, strict=True)
+        )
+
+    def _true_in(self, world: int) -> tuple[int, ...]:
+        found = self._true.get(world)
+        if found is None:
+            local = local_values(self.component, world)
+            values = (compile_condition(knowledge.condition)(local) for knowledge in self.component.known)
+            found = tuple(at for at, value in enumerate(values) if value == Truth.TRUE)
+            self._true[world] = found
+        return found
+
+
+def _believed(weight: int, total: int, at_least: Fraction) -> Truth:
+    """What is believed of a condition with this weight."""
+    enough = at_least.numerator * total
+    if weight * at_least.denominator >= enough:
+        return Truth.TRUE
+    return Truth.FALSE if (total - weight) * at_least.denominator >= enough else Truth.UNKNOWN
+
+
+def beliefs_of(component: Component) -> Beliefs:
+    """The beliefs of a component."""
+    found = component.memo.get("beliefs")
+    if not isinstance(found, Beliefs):
+        found = component.memo["beliefs"] = Beliefs(component)
+    return found
+
+
+def local_values(component: Component, world: int, seen: bytes = b"") -> bytes:
+    """The local variables of a component in a world: its facts, then the seen variables."""
+    bits = (Truth.TRUE if world >> bit & 1 else Truth.FALSE for bit in range(len(component.facts)))
+    return bytes(bits) + seen
+
+
+def _lowest(weights: Iterable[tuple[int, Fraction]]) -> Belief:
+    kept = sorted((world, weight) for world, weight in weights if weight)
+    whole = reduce(lcm, (weight.denominator for _, weight in kept), 1)
+    scaled = [(world, weight.numerator * (whole // weight.denominator)) for world, weight in kept]
+    common = reduce(gcd, (weight for _, weight in scaled), 0)
+    return tuple((world, weight // common) for world, weight in scaled)
+
+
+# --- in the values of a state ------------------------------------------------------------------
+
+
+def place_of(task: Task, component: int) -> int:
+    """Where in the values of a state the number of a component's belief stands."""
+    return len(task.variables) + PLACES * component
+
+
+def number_in(task: Task, values: Values, component: int) -> int:
+    """The number of what is believed of a component in a state."""
+    at = place_of(task, component)
+    return int.from_bytes(values[at : at + PLACES], "big")
+
+
+def belief_in(task: Task, values: Values, component: int) -> Belief:
+    """What is believed of a component in a state."""
+    return beliefs_of(task.components[component]).by_number[number_in(task, values, component)]
+
+
+def told_first(task: Task, values: Values) -> Iterator[tuple[Values, Fraction]]:
+    """What an initial state of the task may become by what the robot is told before its first action."""
+    drawers: list[Drawer] = []
+    for index, component in enumerate(task.components):
+        number = beliefs_of(component).number(component.prior)
+        values += number.to_bytes(PLACES, "big")
+        drawers.append(
+            compile_change(task, Change(index, component.seen, (), component.first), lambda work, found: None)
+        )
+    for (delta, _, _), probability in product_of(values, drawers, lambda work, found: None).items():
+        after = bytearray(values)
+        for place, value in delta:
+            after[place] = value
+        yield bytes(after), probability
+
+
+# --- changes -----------------------------------------------------------------------------------
+
+_Told: TypeAlias = tuple[tuple[int, int], ...]
+"""What the robot sees of one outcome: seen variables by local number with their new values, and below zero
+the numbers of the observations with what they told."""
+
+
+def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
+    """A change of hidden facts as a function from the values of a state to what may come of it: what is
+    believed and known then, and the seen variables that it sets. Costs and rewards that the robot cannot see
+    are expected ones."""
+    component = task.components[change.component]
+    beliefs, kernel = beliefs_of(component), _Kernel(component, change, spend)
+    first = place_of(task, change.component)
+    facts = len(component.facts)
+    cache: dict[tuple[int, bytes], dict[Draw, Fraction]] = {}
+
+    def draw(values: Values) -> dict[Draw, Fraction]:
+        number = int.from_bytes(values[first : first + PLACES], "big")
+        seen = bytes(values[variable] for variable in change.seen)
+        found = cache.get((number, seen))
+        if found is None:
+            found = cache[number, seen] = results(number, seen)
+        return found
+
+    def results(number: int, seen: bytes) -> dict[Draw, Fraction]:
+        belief = beliefs.by_number[number]
+        total = sum(weight for _, weight in belief)
+        by_told: dict[_Told, list[tuple[int, Fraction, Fraction, Fraction]]] = {}
+        for world, weight in belief:
+            for told, after, probability, cost, reward in kernel.of(world, seen):
+                by_told.setdefault(told, []).append((after, weight * probability, cost, reward))
+        drawn: dict[Draw, Fraction] = {}
+        for told, parts in by_told.items():
+            mass = distribution((after, part) for after, part, _, _ in parts)
+            whole = sum(mass.values(), Fraction(0))
+            cost = sum((part * cost for _, part, cost, _ in parts), Fraction(0)) / whole
+            reward = sum((part * reward for _, part, _, reward in parts), Fraction(0)) / whole
+            after_number = beliefs.number(mass.items())
+            sets = [(change.seen[local - facts], value) for local, value in told if local >= 0]
+            sets += beliefs.known(after_number)
+            sets += [(first + at, octet) for at, octet in enumerate(after_number.to_bytes(PLACES, "big"))]
+            key = tuple(sorted(sets)), cost, reward
+            drawn[key] = drawn.get(key, Fraction(0)) + whole / total
+        spend(len(belief), len(drawn))
+        return drawn
+
+    return draw
+
+
+class _Kernel:
+    """What a change does in one world."""
+
+    def __init__(self, component: Component, change: Change, spend: Spend) -> None:
+        self._component = component
+        self._drawers = [compile_factor(factor, spend) for factor in change.factors]
+        self._observations = [_compile(observation) for observation in change.observations]
+        self._spend = spend
+        self._known: dict[tuple[int, bytes], list[tuple[_Told, int, Fraction, Fraction, Fraction]]] = {}
+
+    def of(self, world: int, seen: bytes) -> list[tuple[_Told, int, Fraction, Fraction, Fraction]]:
+        """What the robot sees, the world after, the probability, the cost added, and the reward."""
+        found = self._known.get((world, seen))
+        if found is None:
+            found = self._known[world, seen] = list(self._work_out(world, seen))
+        return found
+
+    def _work_out(self, world: int, seen: bytes) -> Iterator[tuple[_Told, int, Fraction, Fraction, Fraction]]:
+        facts = len(self._component.facts)
+        before = local_values(self._component, world, seen)
+        for (delta, cost, reward), probability in product_of(before, self._drawers, self._spend).items():
+            if not probability:
+                continue
+            values, after = bytearray(before), world
+            for local, value in delta:
+                values[local] = value
+                if local < facts:
+                    after = after | 1 << local if value == Truth.TRUE else after & ~(1 << local)
+            shown = tuple((local, value) for local, value in delta if local >= facts)
+            for told, chance in self._told(bytes(values)):
+                yield (*shown, *told), after, probability * chance, cost, reward
+
+    def _told(self, values: bytes) -> list[tuple[_Told, Fraction]]:
+        """What the observations may tell."""
+        found: list[tuple[_Told, Fraction]] = [((), Fraction(1))]
+        for number, observe in enumerate(self._observations):
+            readings = observe(values)
+            found = (
+                [((*told, (~number, value)), chance * p) for told, chance in found for value, p in readings]
+                if readings
+                else found
+            )
+            self._spend(len(found), len(found))
+        return found
+
+
+def _compile(observation: Observation) -> Callable[[bytes], list[tuple[int, Fraction]]]:
+    """What an observation may tell, with probabilities; nothing where it is not made."""
+    truth = compile_condition(observation.condition)
+    when = compile_condition(TRUE if observation.when is None else observation.when)
+    right, wrong = observation.accuracy, 1 - observation.accuracy
+
+    def readings(values: bytes) -> list[tuple[int, Fraction]]:
+        if when(values) != Truth.TRUE:
+            return []
+        true = truth(values) == Truth.TRUE
+        both = [(int(true), right), (int(not true), wrong)]
+        return [(value, p) for value, p in both if p]
+
+    return readings
