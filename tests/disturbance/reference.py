@@ -115,10 +115,10 @@ class Exact:
         self.stops: dict[State, float] = {}
         for _ in range(ticks):
             changed: dict[Key, float] = {}
-            for (state, finished, tries), p in belief.items():
+            for (state, *memory), p in belief.items():
                 ways = [(float(q), after) for q, after in self.changes(state)] or [(1.0, state)]
                 for q, after in [(1 - self.rate, state), *((self.rate * q, after) for q, after in ways)]:
-                    key = (after, finished, tries)
+                    key = (after, *memory)  # type: ignore[assignment]
                     changed[key] = changed.get(key, 0.0) + p * q
             belief = {}
             for key, p in changed.items():
