@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from bbtc.verifier.verdict import Engine, Verdict
 
 
+_HOLD_HIDDEN = {"json", "yaml"}
+"""Formats that hold what is hidden."""
 _MOST_LISTED = 8  # problems that a hint names
 _LAST_STEPS = 0.04
 """Of the time for planning, what is left for the steps that make a tree of what was found."""
@@ -438,7 +440,9 @@ def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
 def process_text(task: Task, form: str) -> str:
     """The task as a Markov decision process, in the format ``prism`` or ``jani``."""
     from bbtc.backends.models import jani, prism
+    from bbtc.belief.hidden import refuse_hidden
 
+    refuse_hidden(task, "written as a Markov decision process")
     return prism.task_text(task) if form == "prism" else jani.task_text(task)
 
 
@@ -455,7 +459,17 @@ def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
     ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer."""
     from bbtc.verifier.verdict import verify
 
-    return verify(tree, limits, engine)
+    return verify(without_hidden(tree, limits), limits, engine)
+
+
+def without_hidden(tree: Tree, limits: Limits) -> Tree:
+    """The tree with a task that does the same, but hides nothing (:mod:`bbtc.belief.lowered`). Raises
+    ``LimitReached``."""
+    if not tree.task.components:
+        return tree
+    from bbtc.belief.lowered import lowered
+
+    return replace(tree, task=lowered(tree.task, tree.root, limits))
 
 
 def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limits) -> Artefact:
@@ -466,6 +480,8 @@ def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limit
 
     tree = carried(tree)
     exporter = load_exporter(form)
+    if exporter.name not in _HOLD_HIDDEN:
+        tree = without_hidden(tree, limits)
     parsed = parse_options(exporter, options)
     reached = None
     if parsed.get("flow"):

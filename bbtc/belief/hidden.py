@@ -16,6 +16,7 @@ from math import gcd, lcm
 from typing import TypeAlias
 
 from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
+from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import TRUE, compile_condition
 from bbtc.ground.task import Change, Component, Observation, Task
 from bbtc.kleene import Truth
@@ -99,6 +100,15 @@ def _lowest(weights: Iterable[tuple[int, Fraction]]) -> Belief:
     scaled = [(world, weight.numerator * (whole // weight.denominator)) for world, weight in kept]
     common = reduce(gcd, (weight for _, weight in scaled), 0)
     return tuple((world, weight // common) for world, weight in scaled)
+
+
+def refuse_hidden(task: Task, done: str) -> None:
+    """Raise :class:`bbtc.diagnostics.BbtcError` (BBT0506) for a task with hidden facts, which cannot be
+    ``done`` to it."""
+    if task.components:
+        fact = task.components[0].facts[0]
+        message = f"a task with hidden facts, such as {fact}, cannot be {done} yet"
+        raise BbtcError.single("BBT0506", message)
 
 
 # --- in the values of a state ------------------------------------------------------------------

@@ -19,6 +19,9 @@ from bbtc.planner.mdp.state_space import StateSpace
 FEW_STATES = 100_000
 """A space with no more is explored as a whole."""
 
+FEW_BELIEFS = 2_000
+"""The same where there may be beliefs without end, whose weights have ever more digits."""
+
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space
 _BEFORE_VALUES = 1 / 2  # of the time, for exploration within a number of actions
 
@@ -58,7 +61,8 @@ def best_known(
     Raises ``LimitReached`` only if the time is over before anything was found, or with ``whole`` if
     the limits do not allow to explore the whole space.
     """
-    few = limits if whole or costs else replace(limits, states=min(limits.states, FEW_STATES))
+    most = FEW_BELIEFS if task.endless_beliefs else FEW_STATES
+    few = limits if whole or costs else replace(limits, states=min(limits.states, most))
     space = explore_space(task, few if whole else few.part(_SHARE))
     if space.complete:
         found = max_prob(space, limits)
