@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -16,9 +17,19 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task, simulate_tree
 from bbtc.planner.strategies import DEFAULT
+from bbtc.replay.equivalence import ENGINES, difference, engine_missing
 from bbtc.rewrite.repeat import with_repeats
 from bbtc.rewrite.simplify import numbered, size
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, retries_of
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlNode,
+    Node,
+    Tree,
+    actions_of,
+    retries_of,
+    retries_until_success_of,
+)
 from bbtc.tree.validate import check_tree
 from bbtc.verifier.verdict import verify
 from tests.domains.brute_force import runs_of
@@ -115,3 +126,19 @@ def test_the_default_puts_together_what_refinement_repeats(name: str) -> None:
     ours, theirs = (simulate_tree(each, Limits())[0] for each in (tree, published))
     assert (ours.success, ours.cost, ours.actions) == (theirs.success, theirs.cost, theirs.actions)
     assert verify(tree, Limits(), "own").problems == ()
+
+
+def test_attempts_of_several_actions_are_one_and_run_as_before_in_both_engines() -> None:
+    """Refinement inserts the template "find" twice, which looks at one table after the other."""
+    (problem,) = (each for each in PROBLEMS if str(each) == "household/look-for-soda")
+    refined = plan_of(problem, "refine").tree
+    root = repeats(refined.task, refined.root)
+    ((again, attempts),) = retries_until_success_of(root)
+    assert attempts == 2
+    assert len(list(actions_of(again))) > 1
+    assert (size(refined.root), size(root)) == (37, 25)
+    tree = replace(refined, root=root)
+    assert verify(tree, Limits(), "own").problems == ()
+    for form in ENGINES:
+        if engine_missing(form) is None:
+            assert difference(tree, form, Limits()) is None
