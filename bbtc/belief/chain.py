@@ -7,7 +7,7 @@ that starts an action, and that action's outcome; a state in which no action sta
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -17,6 +17,9 @@ from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, Node, actions_of
+
+MOST_BELIEVED = 5_000
+"""States of a chain where there may be beliefs without end: their weights have ever more digits."""
 
 
 class Edge(NamedTuple):
@@ -88,6 +91,8 @@ def explore(
     started: list[int] = []
     edges: list[tuple[Edge, ...]] = []
     given_up: list[int] = []
+    if task.endless_beliefs:
+        limits = replace(limits, states=min(limits.states, MOST_BELIEVED))
     for state in states:  # grows while it is read: breadth first
         limits.check_states(len(states), "the simulation")
         returned = tick(state.values, state.finished)

@@ -17,8 +17,8 @@ from typing import TypeAlias
 
 from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
 from bbtc.diagnostics import BbtcError
-from bbtc.ground.condition import TRUE, compile_condition
-from bbtc.ground.task import Change, Component, Observation, Task
+from bbtc.ground.condition import TRUE, Condition, compile_condition
+from bbtc.ground.task import Change, Component, Knowledge, Observation, Task
 from bbtc.kleene import Truth
 from bbtc.markov import distribution
 
@@ -36,6 +36,7 @@ class Beliefs:
     _known: list[Delta] = field(default_factory=list)
     _true: dict[int, tuple[int, ...]] = field(default_factory=dict)
     """By world: which of the conditions of :attr:`Component.known` are true."""
+    _chances: dict[tuple[int, Condition], Fraction] = field(default_factory=dict)
 
     def number(self, weights: Iterable[tuple[int, Fraction]]) -> int:
         """The number of the belief with these weights of worlds, which need not sum to 1."""
@@ -50,6 +51,20 @@ class Beliefs:
     def known(self, number: int) -> Delta:
         """The task's variables that tell what is known, and their values in a belief."""
         return self._known[number]
+
+    def chance(self, number: int, condition: Condition) -> Fraction:
+        """How probable a condition over the facts is in a belief."""
+        found = self._chances.get((number, condition))
+        if found is None:
+            belief, holds = self.by_number[number], compile_condition(condition)
+            true = sum(w for world, w in belief if holds(local_values(self.component, world)) == Truth.TRUE)
+            found = self._chances[number, condition] = Fraction(true, sum(weight for _, weight in belief))
+        return found
+
+    def believed(self, number: int, knowledge: Knowledge) -> Truth:
+        """What is believed of something in a belief."""
+        chance = self.chance(number, knowledge.condition)
+        return _believed(chance.numerator, chance.denominator, knowledge.at_least)
 
     def _known_in(self, belief: Belief) -> Delta:
         true = [0] * len(self.component.known)

@@ -42,7 +42,6 @@ from bbtc.planner.chaining.search import plan_search
 from bbtc.planner.elsewhere import also_at, only_at, starts_elsewhere
 from bbtc.planner.finish import bound_attempts
 from bbtc.planner.guard import guarded
-from bbtc.planner.mdp.solve import FEW_BELIEFS
 from bbtc.planner.objective import Worth, best_of
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.recovering import recovering_tree
@@ -250,8 +249,6 @@ class _Auto:
             return None
         work = _WORK_FOR_LARGE if nodes > LARGE_TREE else STATES_AND_ACTIONS
         most = max(1, min(self.limits.states, work // max(1, actions)))
-        if self.task.endless_beliefs:
-            most = min(most, FEW_BELIEFS)
         few = replace(self.limits, states=most)
         try:
             return plan_policy(self.task, self.target, few, _silent, self.options, whole=True)

@@ -127,3 +127,16 @@ def test_strategies_and_worlds_that_know_of_nothing_hidden_refuse() -> None:
     with pytest.raises(bbtc.BbtcError) as refused:
         bbtc.perturb(tree, Fraction(1, 20))
     assert [each.code for each in refused.value.diagnostics] == ["BBT0506"]
+
+
+@pytest.mark.parametrize(("target", "difference"), [("0.85", 1), ("0.96", 2), ("0.99", 3), ("0.999", 4)])
+def test_how_often_to_listen_is_found(target: str, difference: int) -> None:
+    """What reads alike, but is believed more or less, is told apart by thresholds of the planner's own: one
+    counts readings for either side."""
+    q = ACCURACY
+    plan = bbtc.plan(tiger(q), target=Fraction(target))
+    assert plan.tree.success_probability == q**difference / (q**difference + (1 - q) ** difference)
+    assert plan.tree.status == "target-reached"
+    added = [v.predicate for v in plan.tree.task.variables if v.predicate.startswith("believed-")]
+    assert added == ["believed-tiger"]
+    assert bbtc.verify(plan).problems == ()

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import count
 
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
@@ -61,8 +62,15 @@ def best_known(
     Raises ``LimitReached`` only if the time is over before anything was found, or with ``whole`` if
     the limits do not allow to explore the whole space.
     """
-    most = FEW_BELIEFS if task.endless_beliefs else FEW_STATES
-    few = limits if whole or costs else replace(limits, states=min(limits.states, most))
+    if task.endless_beliefs:
+        near = _nearest(task, limits.part(_SHARE), target)
+        if near is not None:
+            return near
+        if whole:
+            replace(limits, states=FEW_BELIEFS).check_states(FEW_BELIEFS + 1, "exploration")
+        searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
+        return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+    few = limits if whole or costs else replace(limits, states=min(limits.states, FEW_STATES))
     space = explore_space(task, few if whole else few.part(_SHARE))
     if space.complete:
         found = max_prob(space, limits)
@@ -72,6 +80,23 @@ def best_known(
     del space  # two of them may be too much
     searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
     return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+
+
+def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None:
+    """The least space, by the number of actions, in which a policy reaches the target; or all of it. None
+    where neither is within reach: with beliefs without end, P* may be what no policy attains."""
+    few = replace(limits, states=min(limits.states, FEW_BELIEFS))
+    for depth in count(1):
+        space = explore_space(task, few, depth)
+        if space.stop is not None:
+            return None
+        found = max_prob(space, limits)
+        if space.complete:
+            return Best(found, found.initial)
+        if target is not None and found.initial.lower >= target:
+            upper = max_prob(space, limits, space.goal | space.fringe).initial.upper
+            return Best(found, Bounds(found.initial.lower, upper))
+    raise AssertionError("unreachable")
 
 
 @dataclass(frozen=True, slots=True)
