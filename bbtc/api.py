@@ -153,8 +153,8 @@ def plan(
 ) -> Plan:
     """Plan a tree that reaches the goal with the target probability (default: the problem's own).
 
-    Without ``limits``, planning takes a minute at most. ``strategy`` is ``advised`` (the default),
-    ``auto``, ``search``, ``policy``, ``strong-cyclic`` or ``refine``;
+    Without ``limits``, planning takes a minute at most. ``strategy`` is ``auto`` (the default),
+    ``search``, ``policy``, ``strong-cyclic``, ``refine`` or ``advised``;
     ``max_actions`` bounds the actions of every run; ``retries`` are ``unbounded``, or the ``least`` that meet
     the target; of trees that meet it, ``prefer`` those of most ``success``, least ``cost`` or least ``size``;
     in a ``closed_world`` nobody else changes anything, and what the tree reads only for that is left out

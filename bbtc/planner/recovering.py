@@ -32,7 +32,7 @@ from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.planner.elsewhere import MOST_VISITED, also_at, changed, spread
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.graph import draw_probabilities, sums
-from bbtc.planner.mdp.maxprob import MaxProb, max_prob
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.packing import Flags, bit_test, holds
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.mdp.state_space import StateSpace
@@ -58,26 +58,38 @@ _FEW_STATES = 2_000
 """Where there are no more, all that may change is looked at in each of them, again and again."""
 
 
-def recovering_tree(task: Task, limits: Limits) -> Node | None:
-    """A tree of the least expected cost among those of the best success probability, which does what it can
-    from anywhere else; None where costs are not known. Raises ``LimitReached``."""
-    space = _wide_space(task, limits)
+@dataclass(frozen=True, slots=True)
+class Recovering:
+    """A tree of the least expected cost among those of the best success probability, which is in ``bounds``.
+    It does what it can from every state that was looked at; ``everywhere``: these are all that any actions
+    and any changes lead to."""
+
+    root: Node
+    bounds: Bounds
+    everywhere: bool
+
+
+def recovering_tree(task: Task, limits: Limits, *, everywhere: bool = False) -> Recovering | None:
+    """A tree that does what it can from anywhere; None where costs are not known. Raises ``LimitReached``,
+    and with ``everywhere`` also where not all states are looked at."""
+    space, all_of_them = _wide_space(task, limits, everywhere=everywhere)
     found = max_prob(space, limits)
     choices = _choices(found, limits)
     if choices is None:
         return None
     learner = _Learner(task, found, choices, limits)
-    return _tree(task, [*learner.deciding(), *learner.waiting()])
+    root = _tree(task, [*learner.deciding(), *learner.waiting()])
+    return Recovering(root, found.initial, all_of_them)
 
 
-def _wide_space(task: Task, limits: Limits) -> StateSpace:
+def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateSpace, bool]:
     """All that any actions lead to, also behind the goal and from where others may leave some states, all of
-    them if they are few. Choices of goal states are left out. Raises ``LimitReached``."""
+    them if they are few; is that everything? Choices of goal states are left out. Raises ``LimitReached``."""
     endless = replace(task, goal=FALSE)
     space = _whole(endless, limits)
     facts = ChangingFacts.of(task, limits)
     own = initial_belief(task)
-    wider = endless
+    wider, all_of_them = endless, False
     while True:
         states = [space.packing.values(space.states, row) for row in range(len(space.states))]
         few = len(states) <= _FEW_STATES
@@ -85,11 +97,14 @@ def _wide_space(task: Task, limits: Limits) -> StateSpace:
         starts = changed(facts, states if few else spread(states, MOST_VISITED), limits)
         new = [tuple(map(Truth, values)) for values in starts if values not in known]
         if not new:
+            all_of_them = few
             break
         wider = also_at(endless, [*[each.values for each in wider.initial[len(endless.initial) :]], *new])
         try:
             space = _whole(wider, limits)
         except LimitReached:
+            if everywhere:
+                raise
             limits.check_time("the search for a tree that recovers")
             break
         if not few:
@@ -98,7 +113,7 @@ def _wide_space(task: Task, limits: Limits) -> StateSpace:
     goal = holds(space.packing, bit_test(space.packing, task.goal), space.states)
     kept = ~goal[space.choice_state]
     edges = kept[space.edge_choice]
-    return replace(
+    wide = replace(
         space,
         task=task,
         goal=goal,
@@ -109,6 +124,7 @@ def _wide_space(task: Task, limits: Limits) -> StateSpace:
         edge_draw=space.edge_draw[edges],
         initial=tuple((probability, numbers[values]) for values, probability in own.items()),
     )
+    return wide, all_of_them
 
 
 def _whole(task: Task, limits: Limits) -> StateSpace:

@@ -68,7 +68,7 @@ def test_the_best_chance_to_find_a_thing(places: int, looks: int, best: Fraction
 
 @pytest.mark.parametrize(("believed", "difference"), [("0.85", 1), ("0.96", 2), ("0.99", 3), ("0.999", 4)])
 def test_listening_until_it_is_believed(believed: str, difference: int) -> None:
-    """A walk on the difference of readings: right with P = q^d / (q^d + (1−q)^d), d(2P − 1)/(2q − 1) steps."""
+    """A walk on the difference of readings: right with P = q^d/(q^d + (1−q)^d), d(2P − 1)/(2q − 1) steps."""
     q = ACCURACY
     right = q**difference / (q**difference + (1 - q) ** difference)
     plan = bbtc.plan(tiger(q, Fraction(believed)), target=Fraction(believed))

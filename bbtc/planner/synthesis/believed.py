@@ -2,9 +2,10 @@
 has to ask about, too.
 
 Thresholds on how probable something is believed to be are variables like others
-(:class:`bbtc.ground.task.Knowledge`). Added are thresholds on what is believed anyway, between levels that
-want different actions, as few as tell them all apart; where none tells, thresholds on single worlds. With
-readings of one kind this is a counter: of how many more of them spoke for something than against it.
+(:class:`bbtc.ground.task.Knowledge`). Added are thresholds on what conditions read, and on single facts,
+between levels that want different actions, as few as tell them all apart; where none tells, thresholds on
+single worlds. With readings of one kind this is a counter: of how many more of them spoke for something than
+against it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from typing import TypeAlias
 
 from bbtc.belief.hidden import Beliefs, beliefs_of
 from bbtc.ground.condition import Condition, Is, conjunction
-from bbtc.ground.task import Component, InitialState, Knowledge, Task, Variable
+from bbtc.ground.task import Component, InitialState, Knowledge, Task, Variable, split_name
 from bbtc.kleene import Truth
 from bbtc.planner.synthesis.permissive import MultiPolicy
 from bbtc.rounding import decimal
@@ -78,7 +79,11 @@ def _thresholds(
 ) -> Iterator[tuple[Variable, Condition, Fraction]]:
     """Thresholds that tell pairs apart: what the condition is called, the condition, and the threshold."""
     beliefs, waiting = beliefs_of(component), list(pairs)
-    named = {each.condition: task.variables[each.variable] for each in component.known}
+    named: dict[Condition, Variable] = {
+        each.condition: task.variables[each.variable] for each in component.known
+    }
+    for place, fact in enumerate(component.facts):
+        named.setdefault(Is(place, Truth.TRUE), Variable(*split_name(fact), three_valued=True))
     for condition, name in named.items():
         yield from ((name, condition, at_least) for at_least in _piercing(beliefs, condition, waiting))
         waiting = [pair for pair in waiting if _between(beliefs, condition, pair) is None]
