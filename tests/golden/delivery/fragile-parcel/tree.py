@@ -329,7 +329,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(desk7)",
                 Condition("not at(desk7)", lambda: negated(robot.at("desk7"))),
                 Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),
@@ -344,12 +344,12 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(desk7)",
                 Condition("not carrying(vase)", lambda: negated(robot.carrying("vase"))),
                 Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),
             sequence(
-                "sequence",
+                "for at(desk7)",
                 Condition("staffed(reception)", lambda: robot.staffed("reception")),
                 Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),

@@ -411,7 +411,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for in_view(chocolates)",
                 Condition("not lost(wine)", lambda: negated(robot.lost("wine"))),
                 Latch(
                     "look_for(chocolates)",
@@ -490,7 +490,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for in_view(chocolates)",
                 Condition(
                     "packed(chocolates,crate1)",
                     lambda: robot.packed("chocolates", "crate1"),
@@ -507,7 +507,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for in_view(wine)",
                 Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
                 Latch(
                     "look_for(wine)",

@@ -340,7 +340,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(packing)",
                 Condition("loaded(drill)", lambda: robot.loaded("drill")),
                 Latch(
                     "drive(packing)",
@@ -373,7 +373,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(a1)",
                 Condition("at(packing)", lambda: robot.at("packing")),
                 Latch(
                     "drive(a1)",
@@ -446,7 +446,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(a1)",
                 Condition(
                     "(known stored(drill,a1) and stored(drill,a1))",
                     lambda: all_of(
@@ -478,7 +478,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(a1)",
                 Condition("unknown stored(drill,a1)", lambda: robot.stored("drill", "a1") is None),
                 Latch(
                     "drive(a1)",
@@ -504,7 +504,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(packing)",
                 Condition("at(a1)", lambda: robot.at("a1")),
                 Latch(
                     "drive(packing)",
@@ -537,7 +537,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(a1)",
                 Condition("blocked(a1,packing)", lambda: robot.blocked("a1", "packing")),
                 Latch(
                     "drive(a1)",
@@ -563,7 +563,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(a1)",
                 Condition("blocked(packing,a1)", lambda: robot.blocked("packing", "a1")),
                 Latch(
                     "drive(a1)",
