@@ -92,7 +92,7 @@ class _Lowering:
             return False
         if any(2 ** len(doing.seen) > _MOST_SEEN for doing in self._doings):
             return False
-        waiting = [self._meet(self._beliefs.number(self._component.prior))]
+        waiting = [self._meet(self._beliefs.prior)]
         while waiting:
             belief = waiting.pop()
             for doing in self._doings:

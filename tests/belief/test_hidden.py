@@ -18,7 +18,7 @@ from bbtc.ground.condition import Is
 from bbtc.ground.task import Observation, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from tests.belief.hidden_tasks import search, tiger
+from tests.belief.hidden_tasks import part, search, tiger
 
 LIMITS = Limits()
 ACCURACY = Fraction(17, 20)
@@ -140,3 +140,26 @@ def test_how_often_to_listen_is_found(target: str, difference: int) -> None:
     added = [v.predicate for v in plan.tree.task.variables if v.predicate.startswith("believed-")]
     assert added == ["believed-tiger"]
     assert bbtc.verify(plan).problems == ()
+
+
+@pytest.mark.parametrize(("actions", "best"), [(0, "0.7"), (1, "0.7"), (2, "0.85"), (3, "0.901")])
+def test_the_best_chance_to_stop_where_the_goal_is_true(actions: int, best: str) -> None:
+    """Nothing makes the goal known. One reading and a turn: .7 · .85 + .3 · .85; without a turn left, .7. Of two
+    readings, only both together turn it: .7 (1 − .15²) + .3 · .85²."""
+    task = part(ACCURACY)
+    assert bbtc.bounds(task, max_actions=actions + 1).upper == 0
+    value = bbtc.bounds(task, max_actions=actions + 1, allow_guess=True)  # to stop is one
+    assert value.lower == value.upper == Fraction(best)
+
+
+@pytest.mark.parametrize("target", ["0.7", "0.9", "0.99"])
+def test_a_tree_that_guesses_tells_how_often_it_is_mistaken(target: str) -> None:
+    plan = bbtc.plan(part(ACCURACY), target=Fraction(target), allow_guess=True)
+    assert plan.tree.status == "target-reached"
+    figures = bbtc.simulate(plan)
+    assert figures.success == plan.tree.success_probability >= Fraction(target)
+    assert figures.success + figures.mistaken == 1
+    assert (figures.mistaken == Fraction(3, 10)) == (target == "0.7")  # it stops at once
+    names = {variable.predicate for variable in plan.tree.task.variables}
+    assert names <= {"upside-down", "believed-upside-down"}
+    assert {action.schema for action in plan.tree.task.actions} == {"turn", "weigh"}

@@ -47,7 +47,7 @@ def with_beliefs(task: Task, policy: MultiPolicy) -> Task | None:
             knowledge = Knowledge(len(variables), condition, at_least)
             variables.append(variable)
             known.append(knowledge)
-            prior.append(beliefs.believed(beliefs.number(component.prior), knowledge))
+            prior.append(beliefs.believed(beliefs.prior, knowledge))
         components[number] = replace(component, known=tuple(known))
     if not prior:
         return None
