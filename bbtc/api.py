@@ -120,20 +120,7 @@ def compile(  # noqa: A001 - the name of the command
 
     Raises :class:`BbtcError` with everything that is wrong, and :class:`LimitReached`.
     """
-    from bbtc import pipeline
-    from bbtc.model.domain import Model
-
-    report = Report() if report is None else report
-    limits = limits or Limits()
-    models = [each for each in inputs if isinstance(each, Model)]
-    if models:
-        if len(inputs) > 1 or problem is not None:
-            raise TypeError("a model stands alone: it holds its domain and its problem")
-        return pipeline.ground_model(models[0], report, limits)
-    sources = _read([each for each in inputs if not isinstance(each, Model)], limits)
-    if not sources:
-        raise TypeError("give a domain and a problem, or a model")
-    return pipeline.task_of_sources(sources, report, limits, Reading(problem, lenient))
+    return _compiled(inputs, limits or Limits(), report, Reading(problem, lenient))
 
 
 def plan(
@@ -145,6 +132,7 @@ def plan(
     prefer: Prefer = "success",
     closed_world: bool = False,
     guarded: bool | None = None,
+    allow_guess: bool = False,
     problem: str | None = None,
     lenient: bool = False,
     limits: Limits | None = None,
@@ -158,7 +146,8 @@ def plan(
     ``max_actions`` bounds the actions of every run; ``retries`` are ``unbounded``, or the ``least`` that meet
     the target; of trees that meet it, ``prefer`` those of most ``success``, least ``cost`` or least ``size``;
     in a ``closed_world`` nobody else changes anything, and what the tree reads only for that is left out
-    (``guarded=False`` means the same, and ``guarded=True`` the contrary); ``problem`` and ``lenient`` as in
+    (``guarded=False`` means the same, and ``guarded=True`` the contrary); with ``allow_guess``, a tree may
+    succeed where the goal is believed, but not known; ``problem`` and ``lenient`` as in
     :func:`load`; ``progress`` is told each refinement as it is made.
     The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
     Raises :class:`BbtcError` for input that is wrong and an unknown strategy, :class:`LimitReached` where the
@@ -172,9 +161,9 @@ def plan(
     limits = limits or Limits(seconds=PLANNING_SECONDS)
     if closed_world and guarded:
         raise ValueError("in a closed world trees have no guards")
-    options = Options(max_actions, retries, prefer, closed_world or guarded is False)
+    options = Options(max_actions, retries, prefer, closed_world or guarded is False, allow_guess)
     tell = progress or (lambda _: None)
-    task = _task(inputs, limits, report, Reading(problem, lenient))
+    task = _task(inputs, limits, report, Reading(problem, lenient, allow_guess))
     return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)
 
 
@@ -182,20 +171,23 @@ def bounds(
     *inputs: Source | Model | Task,
     max_actions: int | None = None,
     costs: bool = False,
+    allow_guess: bool = False,
     problem: str | None = None,
     lenient: bool = False,
     limits: Limits | None = None,
     report: Report | None = None,
 ) -> TaskValue:
     """The best probability that any policy can reach, between an upper and a lower bound; with
-    ``costs``, the least expected cost of reaching it so often, too. Limits are as of :func:`plan`, and it
+    ``costs``, the least expected cost of reaching it so often, too; with ``allow_guess``, of stopping where
+    the goal is true, whether or not that is known. Limits are as of :func:`plan`, and it
     raises as that does."""
     from bbtc.planner.bounds import task_value
     from bbtc.planner.options import Options
 
     limits = limits or Limits(seconds=PLANNING_SECONDS)
-    task = _task(inputs, limits, report, Reading(problem, lenient))
-    return task_value(task, limits, Options(max_actions=max_actions), costs=costs)
+    task = _task(inputs, limits, report, Reading(problem, lenient, allow_guess))
+    options = Options(max_actions=max_actions, allow_guess=allow_guess)
+    return task_value(task, limits, options, costs=costs)
 
 
 def load_tree(source: Source, *, limits: Limits | None = None) -> Tree:
@@ -418,6 +410,24 @@ def _read(sources: Sequence[Source], limits: Limits | None) -> list[SourceFile]:
     return [s if isinstance(s, SourceFile) else read_source(os.fspath(s), most) for s in sources]
 
 
+def _compiled(
+    inputs: Sequence[Source | Model], limits: Limits, report: Report | None, reading: Reading
+) -> Task:
+    from bbtc import pipeline
+    from bbtc.model.domain import Model
+
+    report = Report() if report is None else report
+    models = [each for each in inputs if isinstance(each, Model)]
+    if models:
+        if len(inputs) > 1 or reading.problem is not None:
+            raise TypeError("a model stands alone: it holds its domain and its problem")
+        return pipeline.ground_model(models[0], report, limits, reading)
+    sources = _read([each for each in inputs if not isinstance(each, Model)], limits)
+    if not sources:
+        raise TypeError("give a domain and a problem, or a model")
+    return pipeline.task_of_sources(sources, report, limits, reading)
+
+
 def _task(
     inputs: Sequence[Source | Model | Task], limits: Limits, report: Report | None, reading: Reading
 ) -> Task:
@@ -426,7 +436,7 @@ def _task(
     tasks = [each for each in inputs if isinstance(each, Task)]
     if not tasks:
         rest = [each for each in inputs if not isinstance(each, Task)]
-        return compile(*rest, problem=reading.problem, lenient=reading.lenient, limits=limits, report=report)
+        return _compiled(rest, limits, report, reading)
     if len(inputs) > 1 or reading.problem is not None:
         raise TypeError("a task stands alone: it holds everything there is to plan for")
     return tasks[0]

@@ -7,14 +7,15 @@ that starts an action, and that action's outcome; a state in which no action sta
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
 from bbtc.belief.draws import Values
+from bbtc.belief.hidden import chance_of
 from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
-from bbtc.ground.task import Task
+from bbtc.ground.task import ONE, ZERO, Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, Node, actions_of
 
@@ -43,6 +44,16 @@ class Chain:
     action: tuple[int, ...]
     edges: tuple[tuple[Edge, ...], ...]
     initial: tuple[tuple[Fraction, int], ...]
+    forgets: bool = False
+    """May latched actions start again, as the tree has retry-until-success nodes?"""
+    given_up: tuple[int, ...] = ()
+    """States whose action is running when the next tick gives it up, though nothing has changed."""
+    doubtful: Mapping[int, Fraction] = field(default_factory=dict)
+    """Final states in which the root succeeds though the goal need not be true, and how probably it is."""
+
+    def won(self, state: int) -> Fraction:
+        """How probably a final state is one in which the root succeeds and the goal is true."""
+        return self.doubtful.get(state, ONE) if self.status[state] is NodeStatus.SUCCESS else ZERO
 
     @property
     def final(self) -> list[int]:
@@ -70,7 +81,7 @@ def explore(
             transitions[node.action] = compile_action(task, task.action_by_name[node.action], limits)
         steps.append(transitions[node.action])
     tick = compile_tick(task, root)
-    on_start = memory_of(root).started
+    memory = memory_of(root)
     index: dict[State, int] = {}
     states: list[State] = []
 
@@ -86,19 +97,37 @@ def explore(
     status: list[NodeStatus] = []
     started: list[int] = []
     edges: list[tuple[Edge, ...]] = []
+    given_up: list[int] = []
+    doubtful: dict[int, Fraction] = {}
     if task.endless_beliefs:
         limits = replace(limits, states=min(limits.states, MOST_BELIEVED))
     for state in states:  # grows while it is read: breadth first
         limits.check_states(len(states), "the simulation")
         returned = tick(state.values, state.finished)
         if returned < STARTED:
+            if task.components and returned == NodeStatus.SUCCESS:
+                chance = chance_of(task, task.goal, state.values)
+                if chance < 1:
+                    doubtful[len(status)] = chance
             status.append(NodeStatus(returned))
             started.append(-1)
             edges.append(())
             continue
-        action = returned - STARTED
-        finished = state.finished + on_start[action]  # a latched node that starts has not finished
+        action = memory.action(returned)
+        finished = memory.after(state.finished, returned)
+        if memory.forgets and tick(state.values, memory.during(state.finished, returned)) != STARTED + action:
+            given_up.append(len(status))
         status.append(NodeStatus.RUNNING)
         started.append(action)
         edges.append(tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values)))
-    return Chain(actions, tuple(states), tuple(status), tuple(started), tuple(edges), initial)
+    return Chain(
+        actions,
+        tuple(states),
+        tuple(status),
+        tuple(started),
+        tuple(edges),
+        initial,
+        memory.forgets,
+        tuple(given_up),
+        doubtful,
+    )

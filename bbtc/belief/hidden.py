@@ -8,7 +8,7 @@ still possible.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import gcd, lcm
@@ -16,9 +16,21 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
 from bbtc.diagnostics import BbtcError
-from bbtc.ground.condition import TRUE, Condition, compile_condition
-from bbtc.ground.task import ZERO, Change, Component, Knowledge, Observation, Task
+from bbtc.ground.condition import (
+    TRUE,
+    Condition,
+    Constant,
+    Is,
+    Known,
+    compile_condition,
+    evaluate,
+    leaves,
+    replaced,
+    variables,
+)
+from bbtc.ground.task import ONE, ZERO, Change, Component, Knowledge, Observation, Task
 from bbtc.kleene import Truth
+from bbtc.markov import distribution
 
 Belief: TypeAlias = tuple[tuple[int, int], ...]
 """Worlds still possible, in order, with weights: positive integers without a common divisor."""
@@ -159,6 +171,51 @@ def told_first(task: Task, values: Values) -> Iterator[tuple[Values, Fraction]]:
         yield bytes(after), probability
 
 
+def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
+    """How probable it is in a state that a condition on what is known is really so: what it reads of hidden
+    facts has the value that it has in the world. ``(known …)`` and ``(unknown …)`` ask what is known there,
+    too."""
+    read = set(variables(condition))
+    told = {leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if _asks(leaf)}
+    condition = replaced(condition, lambda leaf: told.get(leaf, leaf))
+    worlds: dict[bytes, Fraction] = {bytes(values): ONE}
+    for index, component in enumerate(task.components):
+        known = [each for each in component.known if each.variable in read]
+        if known:
+            drawn = _drawn(task, values, index, known)
+            worlds = distribution(
+                (_with(world, sets), probability * p)
+                for world, probability in worlds.items()
+                for sets, p in drawn.items()
+            )
+    return sum((p for world, p in worlds.items() if evaluate(condition, world) is Truth.TRUE), ZERO)
+
+
+def _asks(leaf: Is | Known) -> bool:
+    return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
+
+
+def _drawn(task: Task, values: Values, index: int, known: Sequence[Knowledge]) -> dict[Delta, Fraction]:
+    """The values that some conditions have in the world, and how probable they are."""
+    component = task.components[index]
+    belief = belief_in(task, values, index)
+    total = sum(weight for _, weight in belief)
+    tests = [(each.variable, compile_condition(each.condition)) for each in known]
+
+    def truths(world: int) -> Delta:
+        local = local_values(component, world)
+        return tuple((variable, test(local)) for variable, test in tests)
+
+    return distribution((truths(world), Fraction(weight, total)) for world, weight in belief)
+
+
+def _with(values: bytes, sets: Delta) -> bytes:
+    after = bytearray(values)
+    for place, value in sets:
+        after[place] = value
+    return bytes(after)
+
+
 # --- changes -----------------------------------------------------------------------------------
 
 _Told: TypeAlias = tuple[tuple[int, int], ...]
@@ -186,19 +243,12 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
 
     def results(number: int, seen: bytes) -> dict[Draw, Fraction]:
         belief = beliefs.by_number[number]
-        parts = [(weight, part) for world, weight in belief for part in kernel.of(world, seen)]
-        # Whole numbers in the common denominator of all probabilities: they are added and divided often.
-        scale = lcm(*{part.probability.denominator for _, part in parts})
-        total = scale * sum(weight for _, weight in belief)
-        by_told: dict[_Told, dict[int, int]] = {}
+        by_told = kernel.certain(belief, seen)
         amounts: dict[_Told, tuple[Fraction, Fraction]] = {}
-        for weight, part in parts:
-            mass = by_told.setdefault(part.told, {})
-            added = weight * part.probability.numerator * (scale // part.probability.denominator)
-            mass[part.world] = mass.get(part.world, 0) + added
-            if part.cost or part.reward:
-                cost, reward = amounts.get(part.told, (ZERO, ZERO))
-                amounts[part.told] = cost + added * part.cost, reward + added * part.reward
+        scale = 1
+        if by_told is None:
+            by_told, amounts, scale = kernel.drawn(belief, seen)
+        total = scale * sum(weight for _, weight in belief)
         drawn: dict[Draw, Fraction] = {}
         for told, mass in by_told.items():
             whole = sum(mass.values())
@@ -209,7 +259,7 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
             sets += [(first + at, octet) for at, octet in enumerate(after.to_bytes(PLACES, "big"))]
             key = tuple(sorted(sets)), cost / whole, reward / whole
             drawn[key] = drawn.get(key, ZERO) + Fraction(whole, total)
-        spend(len(parts), len(drawn))
+        spend(len(belief), len(drawn))
         return drawn
 
     return draw
@@ -235,6 +285,46 @@ class _Kernel:
         self._observations = [_compile(observation) for observation in change.observations]
         self._spend = spend
         self._known: dict[tuple[int, bytes], list[_Part]] = {}
+        self._only: dict[bytes, dict[int, tuple[_Told, int] | None]] = {}
+        """By what is seen before, and world: what the robot sees, and the world after, if that is certain."""
+
+    def certain(self, belief: Belief, seen: bytes) -> dict[_Told, dict[int, int]] | None:
+        """By what the robot sees, the worlds after with their weights; None where chance, or what is added to
+        cost or reward, has a part in it."""
+        only = self._only.setdefault(seen, {})
+        found: dict[_Told, dict[int, int]] = {}
+        for world, weight in belief:
+            if world not in only:
+                parts = self.of(world, seen)
+                sure = len(parts) == 1 and not parts[0].cost and not parts[0].reward
+                only[world] = (parts[0].told, parts[0].world) if sure else None
+            known = only[world]
+            if known is None:
+                return None
+            mass = found.get(known[0])
+            if mass is None:
+                mass = found[known[0]] = {}
+            mass[known[1]] = mass.get(known[1], 0) + weight
+        return found
+
+    def drawn(
+        self, belief: Belief, seen: bytes
+    ) -> tuple[dict[_Told, dict[int, int]], dict[_Told, tuple[Fraction, Fraction]], int]:
+        """By what the robot sees, the worlds after with their weights, and what is added to cost and reward,
+        with the same weights; they are whole in the unit of the last, the common denominator of all
+        probabilities, since they are added and divided often."""
+        parts = [(weight, part) for world, weight in belief for part in self.of(world, seen)]
+        scale = lcm(*{part.probability.denominator for _, part in parts})
+        found: dict[_Told, dict[int, int]] = {}
+        amounts: dict[_Told, tuple[Fraction, Fraction]] = {}
+        for weight, part in parts:
+            mass = found.setdefault(part.told, {})
+            added = weight * part.probability.numerator * (scale // part.probability.denominator)
+            mass[part.world] = mass.get(part.world, 0) + added
+            if part.cost or part.reward:
+                cost, reward = amounts.get(part.told, (ZERO, ZERO))
+                amounts[part.told] = cost + added * part.cost, reward + added * part.reward
+        return found, amounts, scale
 
     def of(self, world: int, seen: bytes) -> list[_Part]:
         """All that it may do in a world."""

@@ -14,6 +14,7 @@ from bbtc.limits import Limits
 from bbtc.planner.mdp.bounded_search import Advice, search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
+from bbtc.planner.mdp.fully_observable import fully_observable
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.state_space import StateSpace
 
@@ -63,13 +64,7 @@ def best_known(
     the limits do not allow to explore the whole space.
     """
     if task.endless_beliefs:
-        near = _nearest(task, limits.part(_SHARE), target)
-        if near is not None:
-            return near
-        if whole:
-            replace(limits, states=FEW_BELIEFS).check_states(FEW_BELIEFS + 1, "exploration")
-        searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
-        return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+        return _of_endless(task, limits, target, advice, whole=whole, verdict=verdict)
     few = limits if whole or costs else replace(limits, states=min(limits.states, FEW_STATES))
     space = explore_space(task, few if whole else few.part(_SHARE))
     if space.complete:
@@ -80,6 +75,32 @@ def best_known(
     del space  # two of them may be too much
     searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
     return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+
+
+def _of_endless(
+    task: Task, limits: Limits, target: Fraction | None, advice: Advice | None, *, whole: bool, verdict: bool
+) -> Best:
+    """The same, where there may be beliefs without end."""
+    highest = _seeing_all(task, limits.part(_SHARE))
+    found = _nearest(task, limits.part(_SHARE), target)
+    if found is None:
+        if whole:
+            replace(limits, states=FEW_BELIEFS).check_states(FEW_BELIEFS + 1, "exploration")
+        searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
+        found = Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+    bounds = Bounds(found.bounds.lower, max(found.bounds.lower, min(found.bounds.upper, highest)))
+    return replace(found, bounds=bounds)
+
+
+def _seeing_all(task: Task, limits: Limits) -> Fraction:
+    """An upper bound on P*: that of a robot that sees everything."""
+    seeing = fully_observable(task)
+    if seeing is None:
+        return Fraction(1)
+    try:
+        return best_known(seeing, limits).bounds.upper
+    except LimitReached:
+        return Fraction(1)
 
 
 def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None:

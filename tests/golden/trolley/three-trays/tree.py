@@ -353,7 +353,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for trolley_at(ward)",
                 Condition("strapped(tray3)", lambda: robot.strapped("tray3")),
                 Latch(
                     "push(ward)",
@@ -375,20 +375,6 @@ def create_root(robot: Robot) -> Behaviour:
                 lambda: robot.push("ward"),
                 robot.cancel,
                 guard=lambda: negated(robot.trolley_at("ward")),
-                keep=False,
-            ),
-            Latch(
-                "strap(tray1)",
-                lambda: robot.strap("tray1"),
-                robot.cancel,
-                guard=lambda: robot.on("tray1"),
-                keep=False,
-            ),
-            Latch(
-                "strap(tray2)",
-                lambda: robot.strap("tray2"),
-                robot.cancel,
-                guard=lambda: robot.on("tray2"),
                 keep=False,
             ),
             Latch(
