@@ -22,8 +22,8 @@ class Mdp:
         self.best, self._policy = self._most_probable()
 
     def _most_probable(self) -> tuple[list[Fraction], dict[int, int]]:
-        """The best probability of reaching the goal from each state, and a policy that attains it: values of a
-        policy that no action improves are a fixed point, and so not below the best ones."""
+        """The best probability of reaching the goal from each state, and a policy that attains it: values of
+        a policy that no action improves are a fixed point, and so not below the best ones."""
         policy = self._nearer()
         while True:
             rows = {state: self.choices[state][number][1] for state, number in policy.items()}
@@ -66,8 +66,8 @@ class Mdp:
         return found
 
     def least_cost(self) -> Fraction:
-        """The least expected cost of reaching the goal with the best probability, which ends where it is out of
-        reach. All costs are above 0, so what improves a policy that ends is one that ends."""
+        """The least expected cost of reaching the goal with the best probability, which ends where it is out
+        of reach. All costs are above 0, so what improves a policy that ends is one that ends."""
         policy = {state: number for state, number in self._policy.items() if self.best[state]}
         while True:
             rows = {state: self.choices[state][number][1] for state, number in policy.items()}
@@ -105,8 +105,8 @@ def reached(rows: dict[int, Row], ends: Sequence[Fraction]) -> list[Fraction]:
 
 
 def solved(rows: dict[int, Row], added: Sequence[Fraction]) -> list[Fraction]:
-    """The solution of x = P x + added, where states without a row have the value added; every state that has a
-    row must lead out of them. Gauss-Jordan, one state after the other."""
+    """The solution of x = P x + added, where states without a row have the value added; every state that has
+    a row must lead out of them. Gauss-Jordan, one state after the other."""
     system: dict[int, tuple[dict[int, Fraction], Fraction]] = {}
     for state, after in rows.items():
         left: dict[int, Fraction] = {state: _ONE}

@@ -1,4 +1,4 @@
-"""What a problem with hidden state is worth, from its text alone, by the pages on the language and the semantics.
+"""What a problem with hidden state is worth, from its text alone, by the pages on language and semantics.
 
 Worlds are listed whole, every fact of them, and a belief is a distribution over worlds: nothing is grouped,
 left out as irrelevant or named. What the robot sees after an action is what its seen facts are then, and what
@@ -283,7 +283,7 @@ class HiddenText(Lifted):
         found = {fact for fact, true in self.given.items() if true}
         true = {fact for _, facts, _ in results for fact in facts}
         false = {fact for _, facts, sets in results for fact in sets - facts}
-        world = frozenset(((found - false) | true | free))
+        world = frozenset((found - false) | true | free)
         if any(
             world.__contains__(fact) != given
             for fact, given in self.given.items()

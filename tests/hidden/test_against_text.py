@@ -1,5 +1,5 @@
-"""What a problem with hidden state is worth, and what a tree for it does, as its text alone says it, on random
-texts."""
+"""What a problem with hidden state is worth, and what a tree for it does, as its text alone says it, on
+random texts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.hidden.tree_on_beliefs import TreeOnBeliefs, formulas_of
 from tests.long_form import amount
 from tests.profiles import examples
 
-_GROUP = 120
+_GROUP = 100
 _MOST_BELIEFS = 60
 _MOST_LOOKED_AT = 400
 _STRATEGIES = ("policy", "search", "auto")
@@ -43,8 +43,9 @@ def _task(text: str) -> Task | None:
     try:
         return compile_sources([SourceFile("random.pddl", text)], Report(), Limits())
     except BbtcError as error:
-        assert {each.code for each in error.diagnostics} <= {"BBT0412", "BBT0414"}, text
-        return None
+        if {each.code for each in error.diagnostics} <= {"BBT0412", "BBT0414"}:
+            return None
+        raise
 
 
 def _space(reference: HiddenText) -> Mdp | None:
@@ -101,9 +102,9 @@ def _counted(
     return done
 
 
-@pytest.mark.parametrize("group", range(amount(4, 60)))
+@pytest.mark.parametrize("group", range(amount(3, 80)))
 def test_random_texts_are_worth_what_their_words_say(group: int) -> None:
-    """P* and the least expected number of actions, exactly; where beliefs have no end, within three actions."""
+    """P* and the least expected number of actions; where beliefs have no end, within three actions."""
     done = _counted(group, texts(), compare, _GROUP)
     compared = done["0"] + done["between"] + done["1"]
     assert compared > _GROUP / 2

@@ -91,8 +91,10 @@ class TreeOnBeliefs(TreeOnText):
                 rows[at].append((number[follower], p))
             if len(points) > _MOST_POINTS:
                 raise TooLarge
-        means = (reached(rows, column)[0] for column in zip(*stopped, strict=True))
-        return Ends(*means, faults)
+        success, without, failure, blocked = (
+            reached(rows, column)[0] for column in zip(*stopped, strict=True)
+        )
+        return Ends(success, without, failure, blocked, faults)
 
     def _after(self, point: Point, started: Node, belief: Belief) -> Point:
         finished = point.finished | {started["id"]} if started["latched"] else point.finished
@@ -103,9 +105,10 @@ class TreeOnBeliefs(TreeOnText):
 
 
 def formulas_of(task: Task) -> dict[Fact, Any]:
-    """What the variables on formulas of a task stand for: conditions over facts, as a written tree has them."""
+    """What the variables on formulas of a task stand for, as a written tree has it."""
     found: dict[Fact, Any] = {}
-    for component in task_to_json(task).get("components", ()):
+    written: Any = task_to_json(task)
+    for component in written.get("components", ()):
         for known in component["known"]:
             name, _, rest = known["variable"].removesuffix(")").partition("(")
             if known["variable"] not in component["facts"]:
