@@ -24,6 +24,13 @@ def refused(model: md.Model) -> Iterator[Diagnostic]:
                 schema.observe_span,
                 "a noisy reading is written `(probabilistic q (p))`: right with q, whichever the truth",
             )
+        elif schema.observe is not None and not _tells(schema.observe):
+            yield Diagnostic(
+                "BBT0406",
+                f"`:observe` of action `{schema.name}` tells of no fact",
+                schema.observe_span,
+                "leave it out, or name the condition whose truth the robot is told",
+            )
     for sensor in model.sensors:
         yield Diagnostic("BBT0407", f"sensor `{sensor.name}` cannot be grounded yet", sensor.span)
     for clause in model.init.clauses:
@@ -39,6 +46,11 @@ def refused(model: md.Model) -> Iterator[Diagnostic]:
             model.problem_span,
             "bbtc plans for a goal; a metric alone is none",
         )
+
+
+def _tells(observed: mf.Formula | me.Choice) -> bool:
+    """Does an observation read any fact?"""
+    return isinstance(observed, me.Choice) or any(True for _ in mf.readings(observed))
 
 
 def noise(observed: me.Choice) -> tuple[me.Set, Fraction] | None:

@@ -8,12 +8,12 @@ from fractions import Fraction
 
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
-from bbtc.ground.condition import Condition, Constant, Is, Known, replaced
+from bbtc.ground.condition import FALSE, Condition, Constant, Is, Known, replaced
 from bbtc.ground.lower import Frame, Lowered, Lowering
 from bbtc.ground.normal import conjuncts, normal_form
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.refused import noise
-from bbtc.ground.start import Key, Prior
+from bbtc.ground.start import Key, Prior, contradicted
 from bbtc.ground.task_builder import TaskBuilder, reached_from
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -79,6 +79,10 @@ def physical(model: md.Model, report: Report, limits: Limits) -> Physical:
         for clause in begin.prior.clauses
         for part in conjuncts(normal_form(clause.condition))
     ]
+    for clause in clauses:
+        if clause.condition == FALSE:  # of facts that are given, or never true
+            contradicted(report, clause.span or model.init.span)
+            report.raise_errors()
     task = builder.task(reached.actions)
     return _numbered(task, readings, begin.prior, clauses, atoms)
 
