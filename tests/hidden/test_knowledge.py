@@ -9,6 +9,7 @@ import pytest
 
 import bbtc
 from bbtc import pipeline
+from bbtc.belief.lowering import lowered
 from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -110,6 +111,50 @@ def test_noise_tells_nothing_for_sure() -> None:
     assert component.prior == ((0, Fraction(1, 2)), (1, Fraction(1, 2)))
     (observation,) = task.action_by_name["listen()"].changes[0].observations
     assert observation.accuracy == Fraction(17, 20)
+
+
+CAVE = """(define (domain cave) (:types cell)
+  (:predicates (at ?c - cell) (joined ?a ?b - cell) (pit ?c - cell) (breeze ?c - cell))
+  (:action walk :parameters (?a ?b - cell)
+    :precondition (and (at ?a) (joined ?a ?b) (not (pit ?b))) :effect (and (not (at ?a)) (at ?b)))
+  (:sensor skin :parameters (?c - cell) :condition (at ?c) :sense (breeze ?c)))
+(define (problem x) (:domain cave) (:objects m l r e - cell)
+  (:init (at m) (joined m l) (joined m r) (joined l e) (joined r e) {}) (:goal (at e)))"""
+
+
+@pytest.mark.parametrize(
+    ("init", "expected"),
+    [
+        # The breeze at the mouth tells at the start which way is safe.
+        ("(oneof (and (pit l) (breeze m)) (pit r))", (1, 2)),
+        # Nothing tells: no way is known to be safe, and no walk may start.
+        ("(oneof (and (pit l) (breeze l)) (pit r))", (0, 0)),
+        # The breeze is felt at the right, which is safe, and tells nothing of use there.
+        ("(unknown (breeze r)) (pit l)", (1, 2)),
+        # With 1/2 the breeze at the mouth tells that the left is safe.
+        ("(oneof (breeze m) (and (pit l) (pit r)))", (Fraction(1, 2), None)),
+    ],
+)
+def test_sensors_tell_at_the_start_and_where_the_robot_comes(
+    init: str, expected: tuple[Fraction, Fraction | None]
+) -> None:
+    for task in (task_of(CAVE.format(init)), lowered(task_of(CAVE.format(init)), Limits())):
+        probability, cost = best(task)
+        assert probability == expected[0]
+        assert expected[1] is None or cost == expected[1]
+
+
+def test_a_sensor_is_read_after_each_action_that_may_change_what_it_reads() -> None:
+    """A scale tells of the bag whenever something was put in; one of the two stones is heavy."""
+    text = """(define (domain d) (:types stone) (:predicates (heavy ?s - stone) (in ?s - stone) (down) (done))
+      (:action put :parameters (?s - stone) :precondition (not (in ?s))
+        :effect (and (in ?s) (when (heavy ?s) (down))))
+      (:sensor scale :sensed (down))
+      (:action keep :parameters (?s - stone) :precondition (and (heavy ?s) (in ?s)) :effect (done)))
+      (define (problem x) (:domain d) (:objects a b - stone)
+        (:init (oneof (heavy a) (heavy b))) (:goal (done)))"""
+    # put a; keep a, or put b and keep b.
+    assert best(task_of(text)) == (1, Fraction(5, 2))
 
 
 def test_a_fact_made_unknown_is_drawn_anew() -> None:

@@ -35,7 +35,7 @@ def hidden_facts(physical: Physical) -> frozenset[int]:
     hidden = _closed(hidden, leads)
     told = {
         variable
-        for readings in physical.readings.values()
+        for readings in (*physical.readings.values(), physical.first)
         for reading in readings
         for variable in variables(reading.condition)
     }
