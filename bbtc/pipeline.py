@@ -435,6 +435,13 @@ def plan_task(
 
     wanted = task.goal_probability if target is None else target
     options = options or DEFAULTS
+    stopping = None
+    if task.components:
+        from bbtc.planner.stopping import Stopping, doubtful_goal
+
+        if options.allow_guess or doubtful_goal(task):
+            stopping = Stopping.of(task, anywhere=options.allow_guess)
+    task = task if stopping is None else stopping.task
     best = BestTree(task, wanted, options.prefer == "size")
     searching = limits.but_for(_LAST_STEPS)
     plan: Plan | None = None
@@ -455,6 +462,9 @@ def plan_task(
         plan = plan or best.plan("interrupted")
     if not options.closed_world:
         plan = guarded(plan)
+    if stopping is not None:
+        plan = stopping.tree_of(plan, Limits(states=limits.states))
+    task = plan.tree.task
     check_tree(plan.tree)
     broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:

@@ -112,7 +112,7 @@ class _Lowering:
 
     def _told_first(self, state: InitialState) -> dict[Draw, Fraction]:
         """What may be told before the first action."""
-        values = self._values(self._beliefs.number(self._component.prior))
+        values = self._values(self._beliefs.prior)
         values[: len(state.values)] = bytes(state.values)
         change = Change(self._number, self._component.seen, (), self._component.first)
         return compile_change(self._task, change, self._spend)(bytes(values))

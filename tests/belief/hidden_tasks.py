@@ -97,3 +97,20 @@ def search(places: int, found: Fraction = ONE) -> Task:
     actions = (*(look(place) for place in range(places)), *(take(place) for place in range(places)))
     start = InitialState(ONE, (*(Truth.UNKNOWN for _ in range(places)), Truth.FALSE))
     return Task("search", "p", variables, (start,), Is(have, Truth.TRUE), actions, components=(component,))
+
+
+def part(accuracy: Fraction, upside_down: Fraction = Fraction(3, 10)) -> Task:
+    """A part lies upside down with some probability; to weigh it tells, rightly with ``accuracy``; it can be
+    turned. It is to lie as it should, which nothing shows for certain."""
+    variables = (Variable("upside-down", (), three_valued=True, hidden=True),)
+    prior = ((0, 1 - upside_down), (1, upside_down))
+    component = Component(("upside-down()",), prior, (Knowledge(0, Is(0, Truth.TRUE)),))
+    weighed = Change(0, (), (NO_CHANGE,), (Observation(Is(0, Truth.TRUE), accuracy),))
+    up, down = Effect(Is(0, Truth.TRUE), ((0, Truth.FALSE),)), Effect(Is(0, Truth.FALSE), ((0, Truth.TRUE),))
+    turned = Change(0, (), certain(up, down))
+    actions = (
+        GroundAction("turn", (), TRUE, (NO_CHANGE,), ONE, (turned,)),
+        GroundAction("weigh", (), TRUE, (NO_CHANGE,), ONE, (weighed,)),
+    )
+    start, goal = InitialState(ONE, (Truth.UNKNOWN,)), Is(0, Truth.FALSE)
+    return Task("part", "p", variables, (start,), goal, actions, components=(component,))

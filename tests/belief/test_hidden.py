@@ -14,11 +14,12 @@ from bbtc.belief.hidden import belief_in
 from bbtc.belief.lowered import lowered
 from bbtc.belief.simulate import simulate
 from bbtc.belief.state import compile_action, initial_belief
-from bbtc.ground.condition import Is
+from bbtc.ground.condition import And, Is
 from bbtc.ground.task import Observation, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from tests.belief.hidden_tasks import search, tiger
+from bbtc.planner.mdp.fully_observable import fully_observable
+from tests.belief.hidden_tasks import part, search, tiger
 
 LIMITS = Limits()
 ACCURACY = Fraction(17, 20)
@@ -68,7 +69,7 @@ def test_the_best_chance_to_find_a_thing(places: int, looks: int, best: Fraction
 
 @pytest.mark.parametrize(("believed", "difference"), [("0.85", 1), ("0.96", 2), ("0.99", 3), ("0.999", 4)])
 def test_listening_until_it_is_believed(believed: str, difference: int) -> None:
-    """A walk on the difference of readings: right with P = q^d / (q^d + (1−q)^d), d(2P − 1)/(2q − 1) steps."""
+    """A walk on the difference of readings: right with P = q^d/(q^d + (1−q)^d), d(2P − 1)/(2q − 1) steps."""
     q = ACCURACY
     right = q**difference / (q**difference + (1 - q) ** difference)
     plan = bbtc.plan(tiger(q, Fraction(believed)), target=Fraction(believed))
@@ -127,3 +128,61 @@ def test_strategies_and_worlds_that_know_of_nothing_hidden_refuse() -> None:
     with pytest.raises(bbtc.BbtcError) as refused:
         bbtc.perturb(tree, Fraction(1, 20))
     assert [each.code for each in refused.value.diagnostics] == ["BBT0506"]
+
+
+@pytest.mark.parametrize(("target", "difference"), [("0.85", 1), ("0.96", 2), ("0.99", 3), ("0.999", 4)])
+def test_how_often_to_listen_is_found(target: str, difference: int) -> None:
+    """What reads alike, but is believed more or less, is told apart by thresholds of the planner's own: one
+    counts readings for either side."""
+    q = ACCURACY
+    plan = bbtc.plan(tiger(q), target=Fraction(target))
+    assert plan.tree.success_probability == q**difference / (q**difference + (1 - q) ** difference)
+    assert plan.tree.status == "target-reached"
+    added = [v.predicate for v in plan.tree.task.variables if v.predicate.startswith("believed-")]
+    assert added == ["believed-tiger"]
+    assert bbtc.verify(plan).problems == ()
+
+
+@pytest.mark.parametrize(("actions", "best"), [(0, "0.7"), (1, "0.7"), (2, "0.85"), (3, "0.901")])
+def test_the_best_chance_to_stop_where_the_goal_is_true(actions: int, best: str) -> None:
+    """Nothing makes the goal known. One reading and a turn: .7 · .85 + .3 · .85; without a turn left, .7. Of
+    two readings, only both together turn it: .7 (1 − .15²) + .3 · .85²."""
+    task = part(ACCURACY)
+    assert bbtc.bounds(task, max_actions=actions + 1).upper == 0
+    value = bbtc.bounds(task, max_actions=actions + 1, allow_guess=True)  # to stop is one
+    assert value.lower == value.upper == Fraction(best)
+
+
+@pytest.mark.parametrize("target", ["0.7", "0.9", "0.99"])
+def test_a_tree_that_guesses_tells_how_often_it_is_mistaken(target: str) -> None:
+    plan = bbtc.plan(part(ACCURACY), target=Fraction(target), allow_guess=True)
+    assert plan.tree.status == "target-reached"
+    figures = bbtc.simulate(plan)
+    assert figures.success == plan.tree.success_probability >= Fraction(target)
+    assert figures.success + figures.mistaken == 1
+    assert (figures.mistaken == Fraction(3, 10)) == (target == "0.7")  # it stops at once
+    names = {variable.predicate for variable in plan.tree.task.variables}
+    assert names <= {"upside-down", "believed-upside-down"}
+    assert {action.schema for action in plan.tree.task.actions} == {"turn", "weigh"}
+
+
+def test_who_sees_the_world_does_no_worse() -> None:
+    """A thing in one of two places, a hand that closes but once: 1/2 for who cannot look, 1 for who sees."""
+    blind = search(2)
+    grasps = tuple(
+        replace(action, precondition=And((Is(2, Truth.FALSE), action.precondition)))
+        for action in blind.actions
+        if action.schema == "take"
+    )
+    blind = replace(blind, actions=grasps)
+    assert bbtc.bounds(blind).upper == 0  # it is never known where it is
+    seeing = fully_observable(blind)
+    assert seeing is not None
+    assert seeing.components == ()
+    assert bbtc.bounds(seeing).lower == 1
+    for task in (tiger(ACCURACY), search(3, Fraction(1, 2)), part(ACCURACY)):
+        seeing = fully_observable(task)
+        assert seeing is not None
+        for actions in range(1, 5):
+            best = bbtc.bounds(task, max_actions=actions).upper
+            assert best <= bbtc.bounds(seeing, max_actions=actions).lower
