@@ -198,6 +198,9 @@ class Builder(Expressions):
     def external(self, head: Token, predicate: _Predicate, close: Token) -> _Predicate:
         return replace(predicate, external=True, span=head.to(close))
 
+    def observed(self, head: Token, predicate: _Predicate, close: Token) -> _Predicate:
+        return replace(predicate, observed=True, span=head.to(close))
+
     def functions(self, head: Token, declarations: list[_Function], close: Token) -> ast.Functions:
         return ast.Functions(tuple(declarations), head.to(close))
 

@@ -157,6 +157,26 @@ def test_a_sensor_is_read_after_each_action_that_may_change_what_it_reads() -> N
     assert best(task_of(text)) == (1, Fraction(5, 2))
 
 
+PUSH = """(define (domain d) (:predicates (jammed) {} (in))
+  (:action push :effect (when (not (jammed)) (open)))
+  (:action oil :effect (not (jammed)))
+  (:action enter :precondition (open) :effect (in)))
+(define (problem x) (:domain d) (:init (unknown (jammed))) (:goal (in)))"""
+
+
+def test_a_fact_that_is_always_seen_tells_what_changed_it() -> None:
+    """A door that did not open is jammed; where nobody sees it, one cannot know."""
+    seen = task_of(PUSH.format("(observed (open))"))
+    # push; enter, or oil, push and enter.
+    assert best(seen) == (1, 3)
+    without_oil = PUSH.replace("(:action oil :effect (not (jammed)))", "")
+    assert best(task_of(without_oil.format("(observed (open))")))[0] == Fraction(1, 2)
+    unseen = without_oil.format("(open)").replace(
+        "(:action push", "(:action look :observe (in)) (:action push"
+    )
+    assert best(task_of(unseen))[0] == 0
+
+
 def test_a_fact_made_unknown_is_drawn_anew() -> None:
     text = """(define (domain d) (:predicates (heads) (won))
       (:action toss :effect (unknown (heads)))

@@ -49,8 +49,10 @@ def test_a_pair_compiles_unless_it_has_too_many_worlds(domain: str, problem: str
         model = pipeline.resolve_model(inputs, report, checks=False)
     except BbtcError as error:
         pytest.skip(f"not well-formed: {error.diagnostics[0].message}")
+    codes: set[str] = set()
     try:
         pipeline.ground_model(model, report, Limits())
     except BbtcError as error:
         codes = {diagnostic.code for diagnostic in error.diagnostics}
-        assert codes == ({"BBT0412"} if problem in UNREACHABLE else {"BBT0415"}), error
+    allowed = {"BBT0412"} if problem in UNREACHABLE else {"BBT0415"}
+    assert codes in (set(), allowed)

@@ -51,6 +51,8 @@ class Physical:
     draws: tuple[Draw, ...]
     clauses: tuple[Clause, ...]
     uncertain: frozenset[int]
+    observed: frozenset[int]
+    """The facts that are declared as always seen: ``first`` and ``readings`` tell them."""
 
     @property
     def start(self) -> tuple[Truth, ...]:
@@ -82,6 +84,9 @@ def physical(model: md.Model, report: Report, limits: Limits) -> Physical:
         for part in conjuncts(normal_form(clause.condition))
     ]
     sensors = list(_sensed(builder.lowering, model.sensors, limits))
+    for name, predicate in model.predicates.items():
+        if predicate.observed:
+            sensors += [gt.Observation(Is(number, Truth.TRUE)) for number in atoms.numbers[name].values()]
     task = builder.task(reached.actions)
     return _numbered(
         task, readings=readings, sensors=sensors, prior=begin.prior, clauses=clauses, atoms=atoms
@@ -147,6 +152,7 @@ def _numbered(
         for draw in prior.draws
     ]
     uncertain = frozenset(map(variable, prior.atoms))
+    observed = {name for name, predicate in atoms.model.predicates.items() if predicate.observed}
     (first, *_) = task.initial
     values = tuple(
         Truth.UNKNOWN if number in uncertain else value for number, value in enumerate(first.values)
@@ -168,6 +174,7 @@ def _numbered(
         tuple(draws),
         tuple(Clause(replaced(each.condition, leaf), each.span) for each in clauses),
         uncertain,
+        frozenset(number for number, each in enumerate(task.variables) if each.predicate in observed),
     )
 
 

@@ -73,6 +73,11 @@ class ProgramBuilder:
         program = self.program
         for rule in self.model.rules:
             self._derive(rule)
+        for name in sorted(self.usage.doubted):
+            # What a hidden fact makes true may be unknown before it is told.
+            parameters = self.model.predicates[name].parameters
+            number = self.number[name]
+            self._rule(_atom(f"u{number}", parameters), [_atom(f"t{number}", parameters)])
         for index, schema in enumerate(self.model.schemas.values()):
             self._action(index, schema)
         for index, template in enumerate(self.model.templates.values()):
