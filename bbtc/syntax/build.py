@@ -276,6 +276,10 @@ class Builder(Expressions):
         message = "`:observe-agent`, an observation by one of several agents, is not supported"
         raise Misuse("BBT0212", message, keyword.span)
 
+    def sensing_model(self, keyword: Token, _effect: ast.Effect) -> Observe:
+        message = "`:sensing-model`, in which an action tells of declared variables, is not supported"
+        raise Misuse("BBT0212", message, keyword.span, "say `:observe` of the facts that it tells")
+
     derived_head = DerivedHead
 
     def derived(self, form: Token, head: DerivedHead, condition: ast.Formula, close: Token) -> ast.Derived:
@@ -372,7 +376,8 @@ class Builder(Expressions):
     # --- what is refused by name -------------------------------------------------------------
 
     def unsupported_section(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
-        return unsupported(keyword(head), head, close)
+        word = keyword(head)
+        return unsupported(":axiom NAME" if word == ":axiom" else word, head, close)
 
 
 def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: bool = False) -> _Predicate:
