@@ -185,6 +185,8 @@ def test_a_fact_made_unknown_is_drawn_anew() -> None:
       (define (problem x) (:domain d) (:init (unknown (heads))) (:goal (won)))"""
     # look, and with 1/2 toss and look again: x = 1 + 1/2 · 1 + 1/2 (1 + x).
     assert best(task_of(text)) == (1, 4)
+    # A coin that shows tails at first has to be tossed: 1 + x.
+    assert best(task_of(text.replace("(unknown (heads))) (:goal", ") (:goal"))) == (1, 5)
 
 
 def test_domains_without_hidden_state_keep_their_meaning() -> None:

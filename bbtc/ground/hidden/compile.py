@@ -52,6 +52,7 @@ class _Compiler:
         self._report = report
         self._limits = limits
         hidden = hidden_facts(found)
+        self._doubt(hidden)
         kept, names = relevant(found, hidden)
         self._hidden = hidden & kept
         self._kept = kept
@@ -78,6 +79,17 @@ class _Compiler:
         self._clauses_of: dict[int, list[tuple[Condition, Span | None]]] = {}
         self._first_of: dict[int, list[gt.Observation]] = {}
         join(self._groups, self._acts, self._told_first)
+
+    def _doubt(self, hidden: frozenset[int]) -> None:
+        """Warn of observations that tell nothing, whatever the arguments."""
+        for name, read in self._found.read.items():
+            if not read & hidden:
+                self._report.warning(
+                    "BBT0417",
+                    f"`:observe` of action `{name}` tells nothing: what it reads is always seen",
+                    self._model.schemas[name].observe_span,
+                    "say in `:init` what is not known, as `(unknown (p))` or `(oneof …)`",
+                )
 
     def _at_first(self) -> Iterator[gt.Observation]:
         """What sensors tell at the start; whether they do, as far as that is seen, is settled."""

@@ -53,6 +53,8 @@ class Physical:
     uncertain: frozenset[int]
     observed: frozenset[int]
     """The facts that are declared as always seen: ``first`` and ``readings`` tell them."""
+    read: Mapping[str, frozenset[int]]
+    """By schema: what the ``:observe`` of its actions tells of."""
 
     @property
     def start(self) -> tuple[Truth, ...]:
@@ -162,6 +164,11 @@ def _numbered(
         when = None if made.when is None else replaced(made.when, leaf)
         return replace(made, condition=replaced(made.condition, leaf), when=when)
 
+    read: dict[str, set[int]] = {}
+    for action in task.actions:
+        if action.name in readings:
+            of = read.setdefault(action.schema, set())
+            of.update(renumber[each] for told in readings[action.name] for each in variables(told.condition))
     told_first = [observation(each) for each in sensors]
     of_sensors = _after_actions(task, told_first)
     return Physical(
@@ -175,6 +182,7 @@ def _numbered(
         tuple(Clause(replaced(each.condition, leaf), each.span) for each in clauses),
         uncertain,
         frozenset(number for number, each in enumerate(task.variables) if each.predicate in observed),
+        {schema: frozenset(numbers) for schema, numbers in read.items()},
     )
 
 

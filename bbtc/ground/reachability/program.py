@@ -174,7 +174,9 @@ class ProgramBuilder:
             if len(body) > 1 or len(terms) < len(scope):
                 body = self._named(body, terms)
         for leaf in group.sets:
-            self._rule(self._call(f"{LETTER[leaf.value]}{self.number[leaf.predicate]}", leaf.args), body)
+            letters = "utf" if self.usage.hides and leaf.value is Truth.UNKNOWN else LETTER[leaf.value]
+            for letter in letters:
+                self._rule(self._call(f"{letter}{self.number[leaf.predicate]}", leaf.args), body)
 
     # --- rule bodies -------------------------------------------------------------------------
 

@@ -43,8 +43,9 @@ class Usage:
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
         self.open = open_predicates(model)
-        self._hides = has_hidden_state(model)
-        self.doubted = self._doubted() if self._hides else set[str]()
+        self.hides = has_hidden_state(model)
+        """Is there hidden state? Then what becomes unknown is true, or false."""
+        self.doubted = self._doubted() if self.hides else set[str]()
         self._readers: dict[str, set[str]] = {}
         """By predicate: the derived ones that a rule computes from it."""
         for rule in model.rules:
@@ -65,7 +66,7 @@ class Usage:
     def can_be_unknown(self, predicate: str) -> bool:
         """Whether some atom of the predicate may be unknown at some time."""
         if predicate in self.derived:
-            possible = self._hides or self.model.predicates[predicate].three_valued
+            possible = self.hides or self.model.predicates[predicate].three_valued
             return predicate not in self.unchanging and possible
         if predicate in self.doubted:
             return True
