@@ -185,6 +185,9 @@ def test_a_fact_made_unknown_is_drawn_anew() -> None:
       (define (problem x) (:domain d) (:init (unknown (heads))) (:goal (won)))"""
     # look, and with 1/2 toss and look again: x = 1 + 1/2 · 1 + 1/2 (1 + x).
     assert best(task_of(text)) == (1, 4)
+    # With a draw of its own of 1/3: x = 1 + 1/3 + 2/3 (1 + x).
+    biased = text.replace("(unknown (heads))) (:goal", "(probabilistic 1/3 (heads))) (:goal")
+    assert best(task_of(biased)) == (1, 6)
     # A coin that shows tails at first has to be tossed: 1 + x.
     assert best(task_of(text.replace("(unknown (heads))) (:goal", ") (:goal"))) == (1, 5)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, TRUE, Condition, Is, Known, conjuncts, replaced, variables
@@ -34,9 +35,14 @@ class Act:
 
 
 def act(
-    action: gt.GroundAction, readings: Iterable[gt.Observation], kept: Set[int], hidden: frozenset[int]
+    action: gt.GroundAction,
+    readings: Iterable[gt.Observation],
+    kept: Set[int],
+    hidden: frozenset[int],
+    odds: Mapping[int, Fraction],
 ) -> Act:
-    """An action, as far as it matters: ``kept`` variables, of which some are ``hidden``."""
+    """An action, as far as it matters: ``kept`` variables, of which some are ``hidden``. ``odds`` tells
+    how likely facts are true that are drawn anew."""
     parts = parts_of(action.factors)
     draws = [only(draw, kept) for draw in parts.draws]
     parts = replace(
@@ -45,7 +51,7 @@ def act(
         draws=[draw for draw in draws if draw is not None],
     )
     readings = _settled(telling(readings, hidden), _certain_after(action, hidden))
-    return Act(action, drawn_anew(parts), tuple(readings))
+    return Act(action, drawn_anew(parts, odds), tuple(readings))
 
 
 def _certain_after(action: gt.GroundAction, hidden: frozenset[int]) -> dict[int, Truth]:

@@ -56,8 +56,9 @@ class _Compiler:
         kept, names = relevant(found, hidden)
         self._hidden = hidden & kept
         self._kept = kept
+        odds = dict(_odds(found.draws))
         self._acts = [
-            act(action, found.readings.get(action.name, ()), kept, self._hidden)
+            act(action, found.readings.get(action.name, ()), kept, self._hidden, odds)
             for action in found.task.actions
             if action.name in names
         ]
@@ -259,6 +260,15 @@ class _Compiler:
         ]
         first = tuple(map(local.observation, self._first_of.get(leader, ())))
         return gt.Component(tuple(names), tuple(prior.items()), tuple(known), first, tuple(local.seen))
+
+
+def _odds(draws: Iterable[Draw]) -> Iterator[tuple[int, Fraction]]:
+    """The facts that have a draw of their own, with their probabilities."""
+    for draw in draws:
+        if len(draw.variables) == 1:
+            (variable,) = draw.variables
+            whole = sum((weight for weight, _ in draw.branches), Fraction(0))
+            yield variable, sum((weight for weight, true in draw.branches if true), Fraction(0)) / whole
 
 
 def _known_at_first(component: gt.Component) -> Iterator[tuple[int, Truth]]:
