@@ -177,6 +177,21 @@ def test_a_fact_that_is_always_seen_tells_what_changed_it() -> None:
     assert best(task_of(unseen))[0] == 0
 
 
+def test_what_may_have_two_reasons_tells_of_none_for_sure() -> None:
+    """The lamp is on where the bulb was changed with success, or by chance: it tells nothing for sure."""
+    text = """(define (domain d) (:predicates (good) (lit) (w) (done))
+      (:action look :observe (w))
+      (:action spoil :effect (not (good)))
+      (:action change :precondition (not (good))
+        :effect (and (probabilistic 1/2 (and (good) (lit))) (probabilistic {} (lit))))
+      (:action claim :precondition (good) :effect (done)))
+      (define (problem x) (:domain d) (:init (unknown (good)) (unknown (w))) (:goal (done)))"""
+    for other, expected in (("0", 1), ("1/3", 0), ("1", 0)):
+        task = task_of(text.format(other))
+        assert bbtc.bounds(task).upper == expected
+        assert bbtc.bounds(lowered(task, Limits())).upper == expected
+
+
 def test_a_fact_made_unknown_is_drawn_anew() -> None:
     text = """(define (domain d) (:predicates (heads) (won))
       (:action toss :effect (unknown (heads)))

@@ -103,17 +103,44 @@ def join(groups: Groups, acts: Iterable[Act], first: Iterable[gt.Observation]) -
                 groups.join(_hidden(groups, facts_read(setting.when) | {setting.variable}))
         for charge in each.parts.charges:
             groups.join(_hidden(groups, facts_read(charge.when)))
-        for draw in each.parts.draws:
-            groups.join(_hidden(groups, facts_of(draw)))
         for reading in each.readings:
             groups.join(_hidden(groups, read_after([reading])))
-        for draw in each.parts.draws:
-            seen = {setting.variable for setting in all_settings([draw])}
-            touched = facts_of(draw) & seen
-            for reading in each.readings:
-                if read_after([reading]) & seen:
-                    touched |= read_after([reading])
-            groups.join(_hidden(groups, touched))
+        for cluster in _clusters(groups, each):
+            groups.join(cluster.hidden)
+
+
+@dataclass(slots=True)
+class _Cluster:
+    """Draws of an action that set the same seen variables, so that what is seen of one depends on the
+    others; the seen variables that they set, and the hidden facts that they touch, or that a reading of those
+    tells of."""
+
+    draws: list[gt.Factor]
+    sets: set[int]
+    hidden: set[int]
+
+
+def _clusters(groups: Groups, each: Act) -> list[_Cluster]:
+    found: list[_Cluster] = []
+    for draw in each.parts.draws:
+        sets = {setting.variable for setting in all_settings([draw]) if setting.variable not in groups}
+        found = _merged(found, _Cluster([draw], sets, set(_hidden(groups, facts_of(draw)))), sets)
+    for reading in each.readings:
+        read = read_after([reading])
+        if any(cluster.sets & read for cluster in found):
+            found = _merged(found, _Cluster([], set(), set(_hidden(groups, read))), read)
+    return found
+
+
+def _merged(clusters: list[_Cluster], new: _Cluster, over: set[int]) -> list[_Cluster]:
+    """The clusters with a new one, into which those go that set some of these variables."""
+    apart = [cluster for cluster in clusters if not cluster.sets & over]
+    for cluster in clusters:
+        if cluster.sets & over:
+            new.draws[:0] = cluster.draws
+            new.sets |= cluster.sets
+            new.hidden |= cluster.hidden
+    return [*apart, new]
 
 
 def _hidden(groups: Groups, facts: Iterable[int]) -> list[int]:
@@ -163,14 +190,16 @@ def divided(
     for charge in parts.charges:
         (share(facts_read(charge.when)) or seen).charges.append(charge)
     after = {leader: read_after(of.readings) for leader, of in shares.items()}
+    for cluster in _clusters(groups, each):
+        of = share(cluster.hidden)
+        (seen if of is None else of).draws.extend(cluster.draws)
+        if of is not None:
+            leader = groups.of(next(iter(cluster.hidden)))
+            after[leader] = after.get(leader, set()) | cluster.sets
 
     def readers(sets: set[int]) -> list[_Share]:
         return [shares[leader] for leader, read in after.items() if read & sets]
 
-    for draw in parts.draws:
-        of = share(facts_of(draw))
-        sets = {setting.variable for setting in all_settings([draw])}
-        (of or next(iter(readers(sets)), seen)).draws.append(draw)
     for setting in parts.settings:
         of = share([setting.variable])
         for into in [of] if of is not None else readers({setting.variable}) or [seen]:
