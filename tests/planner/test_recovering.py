@@ -36,7 +36,7 @@ T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 LARGE = ("service-robot", "hospital")
 
 
-@examples(amount(150, 3000))
+@examples(amount(80, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) -> None:
     root = recovering_tree(of, Limits())
@@ -49,7 +49,7 @@ def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) ->
         assert attained[state] == pytest.approx(best[state], abs=1e-6)
 
 
-@examples(amount(150, 3000))
+@examples(amount(80, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
     root = recovering_tree(of, Limits())
