@@ -145,6 +145,7 @@ def plan(
     prefer: Prefer = "success",
     closed_world: bool = False,
     guarded: bool | None = None,
+    allow_guess: bool = False,
     problem: str | None = None,
     lenient: bool = False,
     limits: Limits | None = None,
@@ -153,12 +154,13 @@ def plan(
 ) -> Plan:
     """Plan a tree that reaches the goal with the target probability (default: the problem's own).
 
-    Without ``limits``, planning takes a minute at most. ``strategy`` is ``advised`` (the default),
-    ``auto``, ``search``, ``policy``, ``strong-cyclic`` or ``refine``;
+    Without ``limits``, planning takes a minute at most. ``strategy`` is ``auto`` (the default),
+    ``search``, ``policy``, ``strong-cyclic``, ``refine`` or ``advised``;
     ``max_actions`` bounds the actions of every run; ``retries`` are ``unbounded``, or the ``least`` that meet
     the target; of trees that meet it, ``prefer`` those of most ``success``, least ``cost`` or least ``size``;
     in a ``closed_world`` nobody else changes anything, and what the tree reads only for that is left out
-    (``guarded=False`` means the same, and ``guarded=True`` the contrary); ``problem`` and ``lenient`` as in
+    (``guarded=False`` means the same, and ``guarded=True`` the contrary); with ``allow_guess``, a tree may
+    succeed where the goal is believed, but not known; ``problem`` and ``lenient`` as in
     :func:`load`; ``progress`` is told each refinement as it is made.
     The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
     Raises :class:`BbtcError` for input that is wrong and an unknown strategy, :class:`LimitReached` where the
@@ -172,7 +174,7 @@ def plan(
     limits = limits or Limits(seconds=PLANNING_SECONDS)
     if closed_world and guarded:
         raise ValueError("in a closed world trees have no guards")
-    options = Options(max_actions, retries, prefer, closed_world or guarded is False)
+    options = Options(max_actions, retries, prefer, closed_world or guarded is False, allow_guess)
     tell = progress or (lambda _: None)
     task = _task(inputs, limits, report, Reading(problem, lenient))
     return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)
@@ -182,20 +184,23 @@ def bounds(
     *inputs: Source | Model | Task,
     max_actions: int | None = None,
     costs: bool = False,
+    allow_guess: bool = False,
     problem: str | None = None,
     lenient: bool = False,
     limits: Limits | None = None,
     report: Report | None = None,
 ) -> TaskValue:
     """The best probability that any policy can reach, between an upper and a lower bound; with
-    ``costs``, the least expected cost of reaching it so often, too. Limits are as of :func:`plan`, and it
+    ``costs``, the least expected cost of reaching it so often, too; with ``allow_guess``, of stopping where
+    the goal is true, whether or not that is known. Limits are as of :func:`plan`, and it
     raises as that does."""
     from bbtc.planner.bounds import task_value
     from bbtc.planner.options import Options
 
     limits = limits or Limits(seconds=PLANNING_SECONDS)
     task = _task(inputs, limits, report, Reading(problem, lenient))
-    return task_value(task, limits, Options(max_actions=max_actions), costs=costs)
+    options = Options(max_actions=max_actions, allow_guess=allow_guess)
+    return task_value(task, limits, options, costs=costs)
 
 
 def load_tree(source: Source, *, limits: Limits | None = None) -> Tree:

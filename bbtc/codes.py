@@ -131,6 +131,9 @@ _CODES = (
     Code("BBT0411", "no goal to plan for"),
     Code("BBT0412", "goal out of reach", root_cause=True),
     Code("BBT0413", "goal already holds", _WARNING),
+    Code("BBT0414", "no world is left"),
+    Code("BBT0415", "too many worlds"),
+    Code("BBT0416", "condition that mixes too much"),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

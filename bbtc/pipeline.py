@@ -5,7 +5,7 @@ Each stage is imported where it runs: who checks a file needs no planner in memo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from bbtc.verifier.verdict import Engine, Verdict
 
 
+_HOLD_HIDDEN = {"json", "yaml"}
+"""Formats that hold what is hidden."""
 _MOST_LISTED = 8  # problems that a hint names
 _LAST_STEPS = 0.04
 """Of the time for planning, what is left for the steps that make a tree of what was found."""
@@ -132,14 +134,14 @@ def check_documents(
     report: Report,
     reading: Reading = AS_WRITTEN,
     limits: Limits | None = None,
-) -> None:
+) -> list[str]:
     """Everything that is wrong or doubtful in domains and problems, to the report. Each problem is checked
     with the domain of its name; what rests on one problem is a warning only where it holds for all of
-    its domain's. What is right but cannot be grounded is noted. Whether a goal can be reached at all is
-    told where the limits, and bounds of its own, allow to find out."""
+    its domain's. What is right but cannot be grounded is noted. Whether a goal can be reached at all, and
+    which facts are hidden, is told where the limits, and bounds of its own, allow to find out: the latter is
+    what is returned, in lines."""
     from bbtc.analysis.check import check
     from bbtc.analysis.resolve import resolve
-    from bbtc.ground.refused import refused
 
     definitions = [definition for document in documents for definition in document.definitions]
     domains: dict[str, Definition] = {}
@@ -164,6 +166,7 @@ def check_documents(
         for domain, its_problems in problems:
             if domain is home:
                 its_problems.append(problem)
+    hidden: list[str] = []
     for domain, its_problems in problems:
         models = []
         for each in its_problems or [None]:
@@ -182,8 +185,39 @@ def check_documents(
         for diagnostic in check(*models, doubted=doubted) if models else ():
             report.add(diagnostic)
         for model in models:
-            for diagnostic in refused(model):
+            hidden.extend(_hidden(model, report, limits or Limits()))
+    return hidden
+
+
+_CHECKED_ACTIONS = 20_000
+_NOT_LISTED = {"BBT0403", "BBT0404", "BBT0415", "BBT0416"}
+"""What is right, but has too much hidden state to be compiled."""
+
+
+def _hidden(model: Model, report: Report, limits: Limits) -> Iterator[str]:
+    """What of a model cannot be grounded, as notes; which of its facts are hidden, if it is small enough to
+    find out in a check."""
+    from bbtc.ground.hidden.summary import hidden_summary
+    from bbtc.ground.instantiate import ground
+    from bbtc.ground.refused import refused
+    from bbtc.model.hidden import has_hidden_state
+
+    not_yet = list(refused(model))
+    for diagnostic in not_yet:
+        report.add(replace(diagnostic, severity=Severity.NOTE))
+    if not_yet or model.problem is None or not has_hidden_state(model):
+        return
+    few = replace(
+        limits, facts=min(limits.facts, _CHECKED_FACTS), actions=min(limits.actions, _CHECKED_ACTIONS)
+    )
+    try:
+        yield from hidden_summary(ground(model, Report(), few))
+    except BbtcError as error:  # a limit, or what is told elsewhere
+        for diagnostic in error.diagnostics:
+            if diagnostic.code in _NOT_LISTED:
                 report.add(replace(diagnostic, severity=Severity.NOTE))
+            elif diagnostic.code == "BBT0414":
+                report.add(diagnostic)
 
 
 _CHECKED_FACTS = 300_000
@@ -362,7 +396,11 @@ def ground_model(model: Model, report: Report, limits: Limits) -> Task:
 
     task = ground(model, report, limits)
     report.raise_errors()
-    return task
+    if not task.components:
+        return task
+    from bbtc.belief.lowering import lowered
+
+    return lowered(task, limits)
 
 
 def plan_task(
@@ -397,6 +435,13 @@ def plan_task(
 
     wanted = task.goal_probability if target is None else target
     options = options or DEFAULTS
+    stopping = None
+    if task.components:
+        from bbtc.planner.stopping import Stopping, doubtful_goal
+
+        if options.allow_guess or doubtful_goal(task):
+            stopping = Stopping.of(task, anywhere=options.allow_guess)
+    task = task if stopping is None else stopping.task
     best = BestTree(task, wanted, options.prefer == "size")
     searching = limits.but_for(_LAST_STEPS)
     plan: Plan | None = None
@@ -417,6 +462,9 @@ def plan_task(
         plan = plan or best.plan("interrupted")
     if not options.closed_world:
         plan = guarded(plan)
+    if stopping is not None:
+        plan = stopping.tree_of(plan, Limits(states=limits.states))
+    task = plan.tree.task
     check_tree(plan.tree)
     broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:
@@ -436,7 +484,9 @@ def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
 def process_text(task: Task, form: str) -> str:
     """The task as a Markov decision process, in the format ``prism`` or ``jani``."""
     from bbtc.backends.models import jani, prism
+    from bbtc.belief.hidden import refuse_hidden
 
+    refuse_hidden(task, "written as a Markov decision process")
     return prism.task_text(task) if form == "prism" else jani.task_text(task)
 
 
@@ -453,7 +503,17 @@ def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
     ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer."""
     from bbtc.verifier.verdict import verify
 
-    return verify(tree, limits, engine)
+    return verify(without_hidden(tree, limits), limits, engine)
+
+
+def without_hidden(tree: Tree, limits: Limits) -> Tree:
+    """The tree with a task that does the same, but hides nothing (:mod:`bbtc.belief.lowered`). Raises
+    ``LimitReached``."""
+    if not tree.task.components:
+        return tree
+    from bbtc.belief.lowered import lowered
+
+    return replace(tree, task=lowered(tree.task, tree.root, limits))
 
 
 def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limits) -> Artefact:
@@ -464,6 +524,8 @@ def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limit
 
     tree = carried(tree)
     exporter = load_exporter(form)
+    if exporter.name not in _HOLD_HIDDEN:
+        tree = without_hidden(tree, limits)
     parsed = parse_options(exporter, options)
     reached = None
     if parsed.get("flow"):

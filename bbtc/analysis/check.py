@@ -21,6 +21,7 @@ from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.hidden import has_hidden_state
 from bbtc.model.types import Parameter
 from bbtc.source import Span
 from bbtc.syntax.words import TEST_WORDS
@@ -152,6 +153,12 @@ def _untold(known: Known, lost: Collection[str]) -> Iterator[mf.Reading]:
     }
     for schema in model.schemas.values():
         told |= facts.observed(schema)
+    if has_hidden_state(model):
+        # What a draw, a condition of the start or an effect joins may be told by each other.
+        told |= {leaf.predicate for choice in model.init.choices for leaf in me.settings(choice)}
+        told |= {atom.predicate for clause in model.init.clauses for atom in mf.atoms(clause.condition)}
+        guards = (guard for schema in model.schemas.values() for guard in me.conditions(schema.effect))
+        told |= {atom.predicate for guard in guards for atom in mf.atoms(guard)}
     for reading in known.readings:
         predicate = model.predicates[reading.atom.predicate]
         if reading.value is Truth.UNKNOWN or predicate.name not in lost or predicate.name in told:

@@ -14,6 +14,7 @@ from bbtc.markov import reachable
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.hidden import has_hidden_state
 
 Value = tuple[str, Truth]
 
@@ -129,6 +130,8 @@ def reached(model: md.Model) -> Reached:
     for fact in model.init.facts:
         given.setdefault(fact.predicate, set()).add(fact.value)
         result.values[fact.predicate, fact.value] = None
+        if fact.value is Truth.UNKNOWN and has_hidden_state(model):
+            result.values.update({(fact.predicate, value): None for value in (Truth.TRUE, Truth.FALSE)})
     for choice in model.init.choices:
         for leaf in me.settings(choice):
             result.values[leaf.predicate, leaf.value] = None

@@ -49,6 +49,7 @@ def figures_to_json(
         "actions_given_success": _figure(figures.actions_given_success),
         "reward": _figure(figures.reward),
         "states": figures.states,
+        **({"mistaken": figure_text(figures.mistaken)} if figures.mistaken else {}),
         "scenarios": [
             {
                 "p": figure_text(run.probability),
@@ -78,7 +79,7 @@ def figures_to_json(
 
 def values_to_json(tree: Tree, values: Values) -> dict[str, str]:
     """The value of each variable, by name."""
-    pairs = zip(tree.task.variables, values, strict=True)
+    pairs = zip(tree.task.variables, values, strict=False)  # behind them: what is believed
     return {variable.name: Truth(value).word for variable, value in pairs}
 
 
@@ -96,7 +97,7 @@ def failing_run_to_json(tree: Tree, failing: FailingRun) -> dict[str, Any]:
                 "action": step.node.action,
                 "changes": {
                     variable.name: Truth(new).word
-                    for variable, old, new in zip(variables, before, step.values, strict=True)
+                    for variable, old, new in zip(variables, before, step.values, strict=False)
                     if old != new
                 },
             }

@@ -7,16 +7,20 @@ that starts an action, and that action's outcome; a state in which no action sta
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
 from bbtc.belief.draws import Values
+from bbtc.belief.hidden import chance_of
 from bbtc.belief.state import Result, State, Transition, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
-from bbtc.ground.task import Task
+from bbtc.ground.task import ONE, ZERO, Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, Node, actions_of
+
+MOST_BELIEVED = 5_000
+"""States of a chain where there may be beliefs without end: their weights have ever more digits."""
 
 
 class Edge(NamedTuple):
@@ -40,6 +44,12 @@ class Chain:
     action: tuple[int, ...]
     edges: tuple[tuple[Edge, ...], ...]
     initial: tuple[tuple[Fraction, int], ...]
+    doubtful: Mapping[int, Fraction] = field(default_factory=dict)
+    """Final states in which the root succeeds though the goal need not be true, and how probably it is."""
+
+    def won(self, state: int) -> Fraction:
+        """How probably a final state is one in which the root succeeds and the goal is true."""
+        return self.doubtful.get(state, ONE) if self.status[state] is NodeStatus.SUCCESS else ZERO
 
     @property
     def final(self) -> list[int]:
@@ -83,10 +93,17 @@ def explore(
     status: list[NodeStatus] = []
     started: list[int] = []
     edges: list[tuple[Edge, ...]] = []
+    doubtful: dict[int, Fraction] = {}
+    if task.endless_beliefs:
+        limits = replace(limits, states=min(limits.states, MOST_BELIEVED))
     for state in states:  # grows while it is read: breadth first
         limits.check_states(len(states), "the simulation")
         returned = tick(state.values, state.finished)
         if returned < STARTED:
+            if task.components and returned == NodeStatus.SUCCESS:
+                chance = chance_of(task, task.goal, state.values)
+                if chance < 1:
+                    doubtful[len(status)] = chance
             status.append(NodeStatus(returned))
             started.append(-1)
             edges.append(())
@@ -96,4 +113,4 @@ def explore(
         status.append(NodeStatus.RUNNING)
         started.append(action)
         edges.append(tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values)))
-    return Chain(actions, tuple(states), tuple(status), tuple(started), tuple(edges), initial)
+    return Chain(actions, tuple(states), tuple(status), tuple(started), tuple(edges), initial, doubtful)

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from bbtc.ground.condition import compile_condition
-from bbtc.ground.task import Effect, Factor, Outcome
+from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome
 from bbtc.kleene import Truth
 
 Values: TypeAlias = bytes
@@ -28,9 +28,12 @@ _Amounts: TypeAlias = Callable[[Values], tuple[Fraction, Fraction]]  # cost, rew
 def product_of(values: Values, drawers: Iterable[Drawer], spend: Spend) -> dict[Draw, Fraction]:
     """Independent draws combined: sets united (the Kleene maximum where they clash), costs and
     rewards added, equal combinations merged at once so that only distinct results multiply."""
-    total: dict[Draw, Fraction] = {((), Fraction(0), Fraction(0)): Fraction(1)}
+    total: dict[Draw, Fraction] | None = None
     for drawer in drawers:
         drawn = drawer(values)
+        if total is None:
+            total = drawn
+            continue
         combined: dict[Draw, Fraction] = {}
         for (delta, cost, reward), p in total.items():
             for (delta2, cost2, reward2), p2 in drawn.items():
@@ -38,7 +41,7 @@ def product_of(values: Values, drawers: Iterable[Drawer], spend: Spend) -> dict[
                 combined[key] = combined.get(key, Fraction(0)) + p * p2
             spend(len(drawn), len(combined))
         total = combined
-    return total
+    return {((), ZERO, ZERO): ONE} if total is None else total
 
 
 def _unite(first: Delta, second: Delta) -> Delta:

@@ -8,16 +8,27 @@ still possible.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import reduce
 from math import gcd, lcm
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
-from bbtc.ground.condition import TRUE, compile_condition
-from bbtc.ground.task import Change, Component, Observation, Task
+from bbtc.diagnostics import BbtcError
+from bbtc.ground.condition import (
+    TRUE,
+    Condition,
+    Constant,
+    Is,
+    Known,
+    compile_condition,
+    evaluate,
+    leaves,
+    replaced,
+    variables,
+)
+from bbtc.ground.task import ONE, ZERO, Change, Component, Knowledge, Observation, Task
 from bbtc.kleene import Truth
 from bbtc.markov import distribution
 
@@ -35,10 +46,19 @@ class Beliefs:
     _known: list[Delta] = field(default_factory=list)
     _true: dict[int, tuple[int, ...]] = field(default_factory=dict)
     """By world: which of the conditions of :attr:`Component.known` are true."""
+    _chances: dict[tuple[int, Condition], Fraction] = field(default_factory=dict)
 
-    def number(self, weights: Iterable[tuple[int, Fraction]]) -> int:
-        """The number of the belief with these weights of worlds, which need not sum to 1."""
-        belief = _lowest(weights)
+    @property
+    def prior(self) -> int:
+        """The number of what is believed before anything is told."""
+        prior = self.component.prior
+        scale = lcm(*(probability.denominator for _, probability in prior))
+        return self.number({world: int(probability * scale) for world, probability in prior})
+
+    def number(self, weights: Mapping[int, int]) -> int:
+        """The number of the belief with these weights of worlds, none of them 0."""
+        common = gcd(*weights.values())
+        belief = tuple((world, weights[world] // common) for world in sorted(weights))
         found = self._numbers.get(belief)
         if found is None:
             found = self._numbers[belief] = len(self.by_number)
@@ -49,6 +69,20 @@ class Beliefs:
     def known(self, number: int) -> Delta:
         """The task's variables that tell what is known, and their values in a belief."""
         return self._known[number]
+
+    def chance(self, number: int, condition: Condition) -> Fraction:
+        """How probable a condition over the facts is in a belief."""
+        found = self._chances.get((number, condition))
+        if found is None:
+            belief, holds = self.by_number[number], compile_condition(condition)
+            true = sum(w for world, w in belief if holds(local_values(self.component, world)) == Truth.TRUE)
+            found = self._chances[number, condition] = Fraction(true, sum(weight for _, weight in belief))
+        return found
+
+    def believed(self, number: int, knowledge: Knowledge) -> Truth:
+        """What is believed of something in a belief."""
+        chance = self.chance(number, knowledge.condition)
+        return _believed(chance.numerator, chance.denominator, knowledge.at_least)
 
     def _known_in(self, belief: Belief) -> Delta:
         true = [0] * len(self.component.known)
@@ -93,12 +127,13 @@ def local_values(component: Component, world: int, seen: bytes = b"") -> bytes:
     return bytes(bits) + seen
 
 
-def _lowest(weights: Iterable[tuple[int, Fraction]]) -> Belief:
-    kept = sorted((world, weight) for world, weight in weights if weight)
-    whole = reduce(lcm, (weight.denominator for _, weight in kept), 1)
-    scaled = [(world, weight.numerator * (whole // weight.denominator)) for world, weight in kept]
-    common = reduce(gcd, (weight for _, weight in scaled), 0)
-    return tuple((world, weight // common) for world, weight in scaled)
+def refuse_hidden(task: Task, done: str) -> None:
+    """Raise :class:`bbtc.diagnostics.BbtcError` (BBT0506) for a task with hidden facts, which cannot be
+    ``done`` to it."""
+    if task.components:
+        fact = task.components[0].facts[0]
+        message = f"a task with hidden facts, such as {fact}, cannot be {done} yet"
+        raise BbtcError.single("BBT0506", message)
 
 
 # --- in the values of a state ------------------------------------------------------------------
@@ -124,7 +159,7 @@ def told_first(task: Task, values: Values) -> Iterator[tuple[Values, Fraction]]:
     """What an initial state of the task may become by what the robot is told before its first action."""
     drawers: list[Drawer] = []
     for index, component in enumerate(task.components):
-        number = beliefs_of(component).number(component.prior)
+        number = beliefs_of(component).prior
         values += number.to_bytes(PLACES, "big")
         drawers.append(
             compile_change(task, Change(index, component.seen, (), component.first), lambda work, found: None)
@@ -134,6 +169,51 @@ def told_first(task: Task, values: Values) -> Iterator[tuple[Values, Fraction]]:
         for place, value in delta:
             after[place] = value
         yield bytes(after), probability
+
+
+def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
+    """How probable it is in a state that a condition on what is known is really so: what it reads of hidden
+    facts has the value that it has in the world. ``(known …)`` and ``(unknown …)`` ask what is known there,
+    too."""
+    read = set(variables(condition))
+    told = {leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if _asks(leaf)}
+    condition = replaced(condition, lambda leaf: told.get(leaf, leaf))
+    worlds: dict[bytes, Fraction] = {bytes(values): ONE}
+    for index, component in enumerate(task.components):
+        known = [each for each in component.known if each.variable in read]
+        if known:
+            drawn = _drawn(task, values, index, known)
+            worlds = distribution(
+                (_with(world, sets), probability * p)
+                for world, probability in worlds.items()
+                for sets, p in drawn.items()
+            )
+    return sum((p for world, p in worlds.items() if evaluate(condition, world) is Truth.TRUE), ZERO)
+
+
+def _asks(leaf: Is | Known) -> bool:
+    return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
+
+
+def _drawn(task: Task, values: Values, index: int, known: Sequence[Knowledge]) -> dict[Delta, Fraction]:
+    """The values that some conditions have in the world, and how probable they are."""
+    component = task.components[index]
+    belief = belief_in(task, values, index)
+    total = sum(weight for _, weight in belief)
+    tests = [(each.variable, compile_condition(each.condition)) for each in known]
+
+    def truths(world: int) -> Delta:
+        local = local_values(component, world)
+        return tuple((variable, test(local)) for variable, test in tests)
+
+    return distribution((truths(world), Fraction(weight, total)) for world, weight in belief)
+
+
+def _with(values: bytes, sets: Delta) -> bytes:
+    after = bytearray(values)
+    for place, value in sets:
+        after[place] = value
+    return bytes(after)
 
 
 # --- changes -----------------------------------------------------------------------------------
@@ -163,27 +243,44 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
 
     def results(number: int, seen: bytes) -> dict[Draw, Fraction]:
         belief = beliefs.by_number[number]
-        total = sum(weight for _, weight in belief)
-        by_told: dict[_Told, list[tuple[int, Fraction, Fraction, Fraction]]] = {}
-        for world, weight in belief:
-            for told, after, probability, cost, reward in kernel.of(world, seen):
-                by_told.setdefault(told, []).append((after, weight * probability, cost, reward))
+        parts = [(weight, part) for world, weight in belief for part in kernel.of(world, seen)]
+        # Whole numbers in the common denominator of all probabilities: they are added and divided often.
+        scale = lcm(*{part.probability.denominator for _, part in parts})
+        total = scale * sum(weight for _, weight in belief)
+        by_told: dict[_Told, dict[int, int]] = {}
+        amounts: dict[_Told, tuple[Fraction, Fraction]] = {}
+        for weight, part in parts:
+            mass = by_told.setdefault(part.told, {})
+            added = weight * part.probability.numerator * (scale // part.probability.denominator)
+            mass[part.world] = mass.get(part.world, 0) + added
+            if part.cost or part.reward:
+                cost, reward = amounts.get(part.told, (ZERO, ZERO))
+                amounts[part.told] = cost + added * part.cost, reward + added * part.reward
         drawn: dict[Draw, Fraction] = {}
-        for told, parts in by_told.items():
-            mass = distribution((after, part) for after, part, _, _ in parts)
-            whole = sum(mass.values(), Fraction(0))
-            cost = sum((part * cost for _, part, cost, _ in parts), Fraction(0)) / whole
-            reward = sum((part * reward for _, part, _, reward in parts), Fraction(0)) / whole
-            after_number = beliefs.number(mass.items())
+        for told, mass in by_told.items():
+            whole = sum(mass.values())
+            after = beliefs.number(mass)
+            cost, reward = amounts.get(told, (ZERO, ZERO))
             sets = [(change.seen[local - facts], value) for local, value in told if local >= 0]
-            sets += beliefs.known(after_number)
-            sets += [(first + at, octet) for at, octet in enumerate(after_number.to_bytes(PLACES, "big"))]
-            key = tuple(sorted(sets)), cost, reward
-            drawn[key] = drawn.get(key, Fraction(0)) + whole / total
-        spend(len(belief), len(drawn))
+            sets += beliefs.known(after)
+            sets += [(first + at, octet) for at, octet in enumerate(after.to_bytes(PLACES, "big"))]
+            key = tuple(sorted(sets)), cost / whole, reward / whole
+            drawn[key] = drawn.get(key, ZERO) + Fraction(whole, total)
+        spend(len(parts), len(drawn))
         return drawn
 
     return draw
+
+
+class _Part(NamedTuple):
+    """One of the things that a change may do in a world: what the robot sees, the world after, the
+    probability, and what is added to cost and reward."""
+
+    told: _Told
+    world: int
+    probability: Fraction
+    cost: Fraction
+    reward: Fraction
 
 
 class _Kernel:
@@ -194,16 +291,16 @@ class _Kernel:
         self._drawers = [compile_factor(factor, spend) for factor in change.factors]
         self._observations = [_compile(observation) for observation in change.observations]
         self._spend = spend
-        self._known: dict[tuple[int, bytes], list[tuple[_Told, int, Fraction, Fraction, Fraction]]] = {}
+        self._known: dict[tuple[int, bytes], list[_Part]] = {}
 
-    def of(self, world: int, seen: bytes) -> list[tuple[_Told, int, Fraction, Fraction, Fraction]]:
-        """What the robot sees, the world after, the probability, the cost added, and the reward."""
+    def of(self, world: int, seen: bytes) -> list[_Part]:
+        """All that it may do in a world."""
         found = self._known.get((world, seen))
         if found is None:
             found = self._known[world, seen] = list(self._work_out(world, seen))
         return found
 
-    def _work_out(self, world: int, seen: bytes) -> Iterator[tuple[_Told, int, Fraction, Fraction, Fraction]]:
+    def _work_out(self, world: int, seen: bytes) -> Iterator[_Part]:
         facts = len(self._component.facts)
         before = local_values(self._component, world, seen)
         for (delta, cost, reward), probability in product_of(before, self._drawers, self._spend).items():
@@ -214,9 +311,12 @@ class _Kernel:
                 values[local] = value
                 if local < facts:
                     after = after | 1 << local if value == Truth.TRUE else after & ~(1 << local)
-            shown = tuple((local, value) for local, value in delta if local >= facts)
+            # What is set to what it was shows nothing.
+            shown = tuple(
+                (local, value) for local, value in delta if local >= facts and before[local] != value
+            )
             for told, chance in self._told(bytes(values)):
-                yield (*shown, *told), after, probability * chance, cost, reward
+                yield _Part((*shown, *told), after, probability * chance, cost, reward)
 
     def _told(self, values: bytes) -> list[tuple[_Told, Fraction]]:
         """What the observations may tell."""

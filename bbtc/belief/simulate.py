@@ -32,9 +32,10 @@ class FailureShare:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What a tree does, exactly. The probabilities of success, failure, blocked and endless sum
-    to 1. Costs and numbers of actions are expectations; None is infinite, or, given success,
-    undefined because success is impossible."""
+    """What a tree does, exactly. The probabilities of success, failure, blocked, endless and mistaken (the
+    root succeeds, but the goal is not true: what is hidden was taken for true) sum to 1. Costs and numbers of
+    actions are expectations; None is infinite, or, given success, undefined because success is
+    impossible."""
 
     success: Fraction
     failure: Fraction
@@ -47,6 +48,7 @@ class Figures:
     actions_given_success: Fraction | None
     reward: Fraction | None
     states: int
+    mistaken: Fraction = Fraction(0)
 
 
 def simulate(task: Task, root: Node, limits: Limits) -> Figures:
@@ -55,10 +57,9 @@ def simulate(task: Task, root: Node, limits: Limits) -> Figures:
 
 
 def success_of(chain: Chain) -> Fraction:
-    """The probability that runs end in success."""
+    """The probability that runs end in success, the goal being true."""
     visits = Absorption(chain).visits()
-    wins = (state for state in chain.final if chain.status[state] is NodeStatus.SUCCESS)
-    return sum((visits[state] or Fraction(0) for state in wins), Fraction(0))
+    return sum(((visits[state] or Fraction(0)) * chain.won(state) for state in chain.final), Fraction(0))
 
 
 def figures(task: Task, root: Node, chain: Chain) -> Figures:
@@ -69,8 +70,11 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
     mass = {status: Fraction(0) for status in NodeStatus}
     for state in chain.final:
         mass[chain.status[state]] += visits[state] or 0
-    success = mass[NodeStatus.SUCCESS]
-    wins = absorption.hitting({s: Fraction(1) for s in chain.final if chain.status[s] is NodeStatus.SUCCESS})
+    mistaken = sum(
+        ((visits[state] or 0) * (1 - chance) for state, chance in chain.doubtful.items()), Fraction(0)
+    )
+    success = mass[NodeStatus.SUCCESS] - mistaken
+    wins = absorption.hitting({state: chain.won(state) for state in chain.final if chain.won(state)})
     cost, actions, reward = Fraction(0), Fraction(0), Fraction(0)
     won_cost, won_actions = Fraction(0), Fraction(0)
     for state, edges in enumerate(chain.edges):
@@ -97,6 +101,7 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
         actions_given_success=won_actions / success if success else None,
         reward=None if endless else reward,
         states=len(chain.states),
+        mistaken=mistaken,
     )
 
 

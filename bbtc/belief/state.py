@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import Draw, Values, compile_factor, product_of
 from bbtc.belief.hidden import compile_change, told_first
-from bbtc.ground.task import GroundAction, Task
+from bbtc.ground.task import NO_CHANGE, GroundAction, Task
 from bbtc.limits import Limits
 from bbtc.markov import distribution
 
@@ -73,9 +73,9 @@ def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transiti
     :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on states, or
     for longer than time and memory allow."""
     bounded = _Bounded(limits)
-    drawers = [compile_factor(factor, bounded.spend) for factor in action.factors]
-    if action.changes:
-        drawers += [compile_change(task, change, bounded.spend) for change in action.changes]
+    factors = (factor for factor in action.factors if factor != NO_CHANGE)
+    drawers = [compile_factor(factor, bounded.spend) for factor in factors]
+    drawers += [compile_change(task, change, bounded.spend) for change in action.changes]
     cache: dict[Values, tuple[Result, ...]] = {}
 
     def results(values: Values) -> tuple[Result, ...]:

@@ -110,6 +110,8 @@ def _has_oneof(factor: Factor) -> bool:
 def figures_report(tree: Tree, figures: Figures) -> list[str]:
     """The figures of a tree as lines of text."""
     lines = [f"success   {exact(figures.success)}", f"failure   {exact(figures.failure)}"]
+    if figures.mistaken:
+        lines.append(f"mistaken  {exact(figures.mistaken)}: the tree succeeds, but the goal is not true")
     if figures.blocked:
         lines.append(f"blocked   {exact(figures.blocked)}")
     if figures.endless:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from bbtc.belief.draws import Values
+from bbtc.belief.hidden import refuse_hidden
 from bbtc.belief.state import initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.disturbance.execution import careful_actions
@@ -233,6 +234,7 @@ def perturbed_runs(
         raise ValueError(f"the rate {rate} is not between 0 and 1")
     if runs < 1 or most_ticks < 1:
         raise ValueError("there must be at least one run of at least one tick")
+    refuse_hidden(task, "perturbed")
     facts = ChangingFacts.of(task, limits)
     sampler = _Sampler(task, root, facts, limits)
     below = threshold(rate)

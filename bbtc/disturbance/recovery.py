@@ -20,6 +20,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.draws import Values
 from bbtc.belief.failures import FailureFinder
+from bbtc.belief.hidden import refuse_hidden
 from bbtc.belief.tick import NodeStatus
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.intervals import Interval, score, wilson
@@ -109,6 +110,7 @@ def recovery(
     states than the limits allow."""
     if samples is not None and samples < 1:
         raise ValueError("there must be at least one sample")
+    refuse_hidden(task, "started from other states")
     space = explore_space(replace(task, goal=FALSE), limits)  # so that the goal ends nothing
     space.require_complete()
     best = max_prob(space, limits, holds(space.packing, bit_test(space.packing, task.goal), space.states))

@@ -52,6 +52,7 @@ def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
         goal=mapper.condition(task.goal),
         actions=tuple(map(mapper.action, task.actions)),
         templates=tuple(map(mapper.template, task.templates)),
+        components=tuple(map(mapper.component, task.components)),
     )
 
 
@@ -172,7 +173,16 @@ class _Mapper:
             action,
             precondition=self.condition(action.precondition),
             factors=self.factors(action.factors) or (gt.NO_CHANGE,),
+            changes=tuple(replace(change, seen=self._seen(change.seen)) for change in action.changes),
         )
+
+    def component(self, component: gt.Component) -> gt.Component:
+        """The component over the kept variables."""
+        known = tuple(replace(each, variable=self.renumber[each.variable]) for each in component.known)
+        return replace(component, known=known, seen=self._seen(component.seen))
+
+    def _seen(self, seen: Iterable[int]) -> tuple[int, ...]:
+        return tuple(self.renumber[variable] for variable in seen)
 
     def template(self, template: gt.GroundTemplate) -> gt.GroundTemplate:
         """The template over the kept variables."""

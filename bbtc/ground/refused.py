@@ -3,32 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from fractions import Fraction
 
 from bbtc.diagnostics import Diagnostic
+from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
+from bbtc.model import formula as mf
 
-_START = "only facts, `(unknown …)` and `(probabilistic …)` can"
+_START = "facts, `(unknown …)`, `(probabilistic …)`, `(oneof …)` and `(or …)` can"
 
 
 def refused(model: md.Model) -> Iterator[Diagnostic]:
     """An error for every construct of a model that grounding has no counterpart for."""
     for schema in model.schemas.values():
-        if schema.observe is not None:
+        if isinstance(schema.observe, me.Choice) and noise(schema.observe) is None:
             yield Diagnostic(
                 "BBT0406",
-                f"`:observe` of action `{schema.name}` cannot be grounded yet",
+                f"`:observe` of action `{schema.name}` cannot be grounded",
                 schema.observe_span,
-                "write it as an effect: `(probabilistic 1/2 p 1/2 (not p))` under `(unknown p)`",
+                "a noisy reading is written `(probabilistic q (p))`: right with q, whichever the truth",
             )
     for sensor in model.sensors:
         yield Diagnostic("BBT0407", f"sensor `{sensor.name}` cannot be grounded yet", sensor.span)
     for clause in model.init.clauses:
-        what = "`invariant`" if clause.invariant else "`or` and other uncertain conditions"
-        yield Diagnostic("BBT0405", f"{what} in `:init` cannot be grounded yet", clause.span, _START)
-    for choice in model.init.choices:
-        if has_oneof(choice):
-            yield Diagnostic("BBT0404", "`oneof` in `:init` cannot be grounded yet", choice.span, _START)
+        if clause.invariant:
+            yield Diagnostic("BBT0405", "`invariant` in `:init` cannot be grounded yet", clause.span, _START)
+        elif any(_is_no_fact(model, reading) for reading in mf.readings(clause.condition)):
+            message = "a condition in `:init` tells of facts, not of what is known or derived"
+            yield Diagnostic("BBT0405", message, clause.span, _START)
     if model.problem is not None and model.goal is None:
         yield Diagnostic(
             "BBT0411",
@@ -38,8 +41,14 @@ def refused(model: md.Model) -> Iterator[Diagnostic]:
         )
 
 
-def has_oneof(effect: me.Effect) -> bool:
-    """Does a draw of the start leave open how likely its results are?"""
-    return any(
-        isinstance(part, me.Choice) and part.oneof and len(part.branches) > 1 for part in me.walk(effect)
-    )
+def noise(observed: me.Choice) -> tuple[me.Set, Fraction] | None:
+    """The fact that a noisy reading tells, and the probability that it is right; None for other forms."""
+    told = [branch for branch in observed.branches if not isinstance(branch.effect, me.Together)]
+    if observed.oneof or len(told) != 1 or not isinstance(told[0].effect, me.Set):
+        return None
+    return told[0].effect, told[0].probability
+
+
+def _is_no_fact(model: md.Model, reading: mf.Reading) -> bool:
+    tested = reading.value is None or reading.value is Truth.UNKNOWN
+    return tested or model.predicates[reading.atom.predicate].derived

@@ -290,6 +290,14 @@ class Task:
         return {action.name: action for action in self.actions}
 
     @cached_property
+    def endless_beliefs(self) -> bool:
+        """May ever new beliefs follow from each other, since readings are noisy or hidden facts change by
+        chance?"""
+        changes = [change for action in self.actions for change in action.changes]
+        noisy = any(each.accuracy not in (0, 1) for change in changes for each in change.observations)
+        return noisy or any(len(factor.outcomes) > 1 for change in changes for factor in change.factors)
+
+    @cached_property
     def counts_reward(self) -> bool:
         """Is there anything that adds to the reward, or a metric of it?"""
         outcomes = outcomes_of(factor for action in self.actions for factor in action.factors)

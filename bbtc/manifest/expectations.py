@@ -20,6 +20,7 @@ FIGURES: Mapping[str, Callable[[Measured], Fraction | int | None]] = MappingProx
         "success": lambda found: found.figures.success,
         "failure": lambda found: found.figures.failure,
         "blocked": lambda found: found.figures.blocked,
+        "mistaken": lambda found: found.figures.mistaken,
         "endless": lambda found: found.figures.endless,
         "cost": lambda found: found.figures.cost,
         "cost-given-success": lambda found: found.figures.cost_given_success,

@@ -1,25 +1,28 @@
 """The strategies that choose among others.
 
-``auto`` has several planners make a tree, each with a share of the time, and keeps the best
+``auto``, the default, has several planners make a tree, each with a share of the time, and keeps the best
 (:mod:`bbtc.planner.objective`). What one of them finds decides how much the next ones may do:
 
-1. Search over refinements: it takes time with the size of the tree, not of the task.
-2. Write down an optimal policy, of the whole space where that is small. Where a tree that meets the target is
+1. Unless the world is closed, learn rules for all states that actions lead to, or others may
+   (:mod:`bbtc.planner.recovering`), if these are few. Where the tree proves to be the best there is, and is
+   so small that no smaller one could rule it out, planning ends.
+2. Search over refinements: it takes time with the size of the tree, not of the task.
+3. Write down an optimal policy, of the whole space where that is small. Where a tree that meets the target is
    known already, as few states and actions as take a moment are looked at, or, where it is large, some more.
-3. A policy over partial states, which surely reaches the goal, unless it is known that there is none. Where a
+4. A policy over partial states, which surely reaches the goal, unless it is known that there is none. Where a
    tree that meets the target is known, with an effort of a moment.
-4. Where nothing met the target, write down the best policy that the limits allow to find: it tells whether
+5. Where nothing met the target, write down the best policy that the limits allow to find: it tells whether
    the target can be reached.
-5. Refine greedily, as published, where nothing met the target, or, if the smallest tree is asked for, in as
-   many nodes as would make a smaller one than those found.
-6. Unless the world is closed, learn rules for all states that actions lead to, or others may
-   (:mod:`bbtc.planner.recovering`). Where that takes too long, or does not help, and the smallest tree is not
-   asked for, plan as in 2 and 3 once more, for what others may make of visited states, too
+6. Refine greedily, as published, with equal attempts that follow one another put together
+   (:mod:`bbtc.rewrite.repeat`): where nothing met the target, where the task has templates, which only
+   refinement follows, and where the smallest tree is asked for; in no more nodes than a tree may have that
+   would be kept.
+7. The rules of 1, where there are more states. Where that takes too long, or does not help, and the smallest
+   tree is not asked for, plan as in 3 and 4 once more, for what others may make of visited states, too
    (:mod:`bbtc.planner.elsewhere`).
 
-``advised``, the default: templates are their author's advice on how things are done, and only refinement
-follows it. Where a task has templates, and refinement meets the target, its tree is taken, with equal
-attempts that follow one another put together (:mod:`bbtc.rewrite.repeat`); else ``auto``.
+``advised`` trusts templates, their author's advice on how things are done, more than figures: where a task
+has some, and refinement meets the target, its tree is taken; else ``auto``.
 """
 
 from __future__ import annotations
@@ -39,17 +42,16 @@ from bbtc.limits import Effort, Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.chaining.refine import refine
 from bbtc.planner.chaining.search import plan_search
-from bbtc.planner.elsewhere import also_at, only_at, starts_elsewhere
+from bbtc.planner.elsewhere import also_at, elsewhere_of, only_at, starts_elsewhere
 from bbtc.planner.finish import bound_attempts
 from bbtc.planner.guard import guarded
-from bbtc.planner.objective import Worth, best_of
+from bbtc.planner.objective import UNSEEN, Elsewhere, Worth, allowance, best_of
 from bbtc.planner.options import DEFAULTS, Options
-from bbtc.planner.recovering import recovering_tree
+from bbtc.planner.recovering import Recovering, recovering_tree
 from bbtc.planner.result import Plan, Progress, Refinement
 from bbtc.planner.strong_cyclic.plan import plan_strong_cyclic
 from bbtc.planner.synthesis.policy import plan_policy
 from bbtc.rewrite.repeat import with_repeats
-from bbtc.rewrite.simplify import size
 from bbtc.tree.nodes import Node
 
 MANY_ACTIONS = 500
@@ -69,6 +71,9 @@ _LOOKS = 150
 
 _LOOKS_ELSEWHERE = 1500
 """The same for policies from states that others may leave the world in."""
+
+_FEW_STATES = 500
+"""States for which rules are learnt before anything else is tried."""
 
 _MOST_RECOVERING = 60_000
 """States for which a tree that recovers from anywhere is made."""
@@ -98,8 +103,6 @@ def plan_advised(
     follows = options.prefer == "success" and options.retries == "unbounded" and options.max_actions is None
     if task.templates and len(task.actions) <= MANY_ACTIONS and follows:
         advised = _refined(task, target, limits, limits.nodes, options)
-        if advised.tree.status == "target-reached":
-            advised = _with_repeats(advised, limits)
         if advised.tree.status in {"target-reached", "interrupted"}:
             return _told(advised, progress)
     return _told(_best(task, target, limits, options, advised), progress)
@@ -116,6 +119,21 @@ def _silent(step: Refinement) -> None:
 
 
 @dataclass(slots=True)
+class _Candidate:
+    """A plan; the rules for all states that it is made of, if it is; and what its tree does from where others
+    may leave the world, once that was looked at."""
+
+    plan: Plan
+    recovers: Recovering | None = None
+    elsewhere: Elsewhere = UNSEEN
+    worth: Worth = field(init=False)
+    """What counts of it."""
+
+    def __post_init__(self) -> None:
+        self.worth = Worth.of(self.plan, self.elsewhere)
+
+
+@dataclass(slots=True)
 class _Auto:
     """The plans found so far."""
 
@@ -123,21 +141,27 @@ class _Auto:
     target: Fraction
     limits: Limits
     options: Options
-    plans: list[Plan] = field(default_factory=list)
+    candidates: list[_Candidate] = field(default_factory=list)
     elsewhere: Task | None = None
     """The task, beginning in states that others may leave it in."""
-    _recovery: dict[int, Fraction] = field(default_factory=dict)
+    learnt: bool = False
+    """Are rules for all states looked for no more?"""
 
     @property
-    def best(self) -> Plan:
+    def plans(self) -> list[Plan]:
+        """The plans."""
+        return [each.plan for each in self.candidates]
+
+    @property
+    def best(self) -> _Candidate:
         """The best of them."""
-        worths = [Worth.of(plan, self.recovery(plan)) for plan in self.plans]
-        return self.plans[best_of(worths, self.target, self.options.prefer)]
+        worths = [each.worth for each in self.candidates]
+        return self.candidates[best_of(worths, self.target, self.options.prefer)]
 
     @property
     def met(self) -> bool:
         """Does one meet the target?"""
-        return self.best.tree.success_probability >= self.target
+        return self.best.worth.success >= self.target
 
     @property
     def interrupted(self) -> bool:
@@ -149,14 +173,17 @@ class _Auto:
         """No policy does better."""
         return min((plan.tree.bounds[1] for plan in self.plans if plan.tree.bounds), default=Fraction(1))
 
-    def add(self, plan: Plan | None) -> None:
+    def add(self, plan: Plan | None, recovers: Recovering | None = None) -> None:
         """Take a plan into account."""
         if plan is not None:
-            self.plans.append(plan if self.options.closed_world else guarded(plan))
+            plan = plan if self.options.closed_world else guarded(plan)
+            self.candidates.append(self.looked_at(_Candidate(plan, recovers)))
 
     def run(self, refined: Plan | None) -> None:
         """Make plans; ``refined`` is what refinement made, if it fell short of the target before."""
         task, target, limits, options = self.task, self.target, self.limits, self.options
+        if self.learns(_FEW_STATES, everywhere=True) and self.proven:
+            return
         self.add(plan_search(task, target, limits.part(_SEARCH_SHARE), _silent, options))
         for step in (self.of_few_states, self.surely, self.of_all_states):
             if not self.interrupted:
@@ -167,31 +194,29 @@ class _Auto:
             with suppress(LimitReached):
                 self.go_on_from_elsewhere()
 
-    def recovery(self, plan: Plan) -> Fraction:
-        """How often a tree succeeds from where others may leave the world; 0 where that takes too long."""
+    def looked_at(self, candidate: _Candidate) -> _Candidate:
+        """What the tree does from where others may leave the world; nothing good if that takes too long."""
         if self.elsewhere is None:
-            return Fraction(0)
-        if id(plan) not in self._recovery:
-            self._recovery[id(plan)] = self._success_from(self.elsewhere, plan)
-        return self._recovery[id(plan)]
-
-    def _success_from(self, elsewhere: Task, plan: Plan) -> Fraction:
+            return candidate
         few = replace(self.limits, states=min(self.limits.states, _REFINE_STATES))
         try:
-            return success_of(explore(elsewhere, plan.tree.root, few))
+            found = elsewhere_of(explore(self.elsewhere, candidate.plan.tree.root, few), candidate.plan.chain)
         except LimitReached:
-            return Fraction(0)
+            found = UNSEEN
+        return replace(candidate, elsewhere=found)
 
     def go_on_from_elsewhere(self) -> None:
         """Policies that hold from where others may leave the world, too. Raises ``LimitReached``."""
-        task, best = self.task, self.best
+        task, best = self.task, self.best.plan
         if not task.actions or len(task.actions) > MANY_ACTIONS or not best.tree.success_probability:
             return
         starts = starts_elsewhere(task, self.limits, _visited(best))
         if not starts:
             return
         self.elsewhere = only_at(task, starts)
-        if self.recovers() or self.options.prefer == "size":
+        self.candidates = [self.looked_at(each) for each in self.candidates]
+        self.learns(_MOST_RECOVERING)
+        if self.best.recovers or self.options.prefer == "size":
             return
         few = replace(self.limits, states=max(1, STATES_AND_ACTIONS // len(task.actions)))
         with suppress(LimitReached):
@@ -200,18 +225,35 @@ class _Auto:
         if any(plan.tree.success_probability == 1 and plan.chain is not None for plan in self.plans):
             self.surely_from(starts)
 
-    def recovers(self) -> bool:
-        """Rules for all states that actions lead to; is there nothing better?"""
-        most = min(self.limits.states, _MOST_RECOVERING, max(1, _WORK_FOR_LARGE // len(self.task.actions)))
+    def learns(self, most: int, *, everywhere: bool = False) -> bool:
+        """Rules for all states that actions lead to, or really for all, if these are few; are there any?"""
+        actions = len(self.task.actions)
+        if self.learnt or self.options.closed_world or not 0 < actions <= MANY_ACTIONS:
+            return False
+        most = min(self.limits.states, most, max(1, _WORK_FOR_LARGE // actions))
         limits = replace(self.limits.part(_SURE_SHARE), states=most, effort=Effort(_LOOKS_ELSEWHERE))
         try:
-            root = recovering_tree(self.task, limits)
-            if root is None:
+            found = recovering_tree(self.task, limits, everywhere=everywhere)
+            self.learnt = True
+            if found is None or not found.bounds.upper:
                 return False
-            self.add_tree(root)
+            self.add_tree(found.root, found)
         except LimitReached:
             return False
-        return self.best is self.plans[-1]
+        return True
+
+    @property
+    def proven(self) -> bool:
+        """Is the best tree the best there is by success, cost and recovery, and so small that no smaller one
+        could rule it out?"""
+        best = self.best
+        return (
+            self.options.prefer == "success"
+            and best.recovers is not None
+            and best.recovers.everywhere
+            and best.plan.tree.success_probability == best.recovers.bounds.exact
+            and best.worth.nodes <= allowance(1)
+        )
 
     def surely_from(self, starts: Sequence[tuple[Truth, ...]]) -> None:
         """A policy over partial states for those of the starts from which one surely reaches the goal."""
@@ -235,20 +277,25 @@ class _Auto:
             raise KeyboardInterrupt
         self.add_tree(plan.tree.root)
 
-    def add_tree(self, root: Node) -> None:
+    def add_tree(self, root: Node, recovers: Recovering | None = None) -> None:
         """Take a tree into account. Raises ``LimitReached``."""
         chain = explore(self.task, root, replace(self.limits, states=min(self.limits.states, _REFINE_STATES)))
         best = BestTree(self.task, self.target, outer=self.options.best)
         best.take(root, chain, success_of(chain))
-        self.add(best.plan("stuck"))
+        plan = best.plan("stuck")
+        if recovers is not None:
+            bounds = recovers.bounds.lower, recovers.bounds.upper
+            plan = replace(plan, tree=replace(plan.tree, bounds=bounds))
+        self.add(plan, recovers)
 
     def of_few_states(self) -> Plan | None:
         """An optimal policy, where a moment is enough to explore the whole space."""
-        nodes, actions = size(self.best.tree.root), len(self.task.actions)
+        nodes, actions = self.best.worth.nodes, len(self.task.actions)
         if self.met and (nodes == 1 or actions > MANY_ACTIONS):
             return None
         work = _WORK_FOR_LARGE if nodes > LARGE_TREE else STATES_AND_ACTIONS
-        few = replace(self.limits, states=max(1, min(self.limits.states, work // max(1, actions))))
+        most = max(1, min(self.limits.states, work // max(1, actions)))
+        few = replace(self.limits, states=most)
         try:
             return plan_policy(self.task, self.target, few, _silent, self.options, whole=True)
         except LimitReached:  # more states than that
@@ -260,34 +307,38 @@ class _Auto:
             return None
         limits = self.limits.part(_SURE_SHARE)
         if self.met:
-            if size(self.best.tree.root) == 1 or len(self.task.actions) > MANY_ACTIONS:
+            if self.best.worth.nodes == 1 or len(self.task.actions) > MANY_ACTIONS:
                 return None
             limits = replace(limits, effort=Effort(_LOOKS))
         return plan_strong_cyclic(self.task, self.target, limits, _silent, self.options)
 
     def of_all_states(self) -> Plan | None:
         """The best policy that can be found, where nothing met the target."""
-        if self.met or self.upper <= self.best.tree.success_probability:
+        if self.met or self.upper <= self.best.worth.success:
             return None
         return plan_policy(self.task, self.target, self.limits, _silent, self.options)
 
     def refinement(self, refined: Plan | None) -> Plan | None:
         """The greedy refinement, where that may help."""
-        best = self.best
+        best, options = self.best, self.options
         if not self.met:
-            if best.tree.success_probability >= self.upper:
+            if best.worth.success >= self.upper:
                 return None  # nothing can do better
             return refined or self.greedy(self.limits.nodes)
-        if self.options.prefer != "size" or refined is not None or len(self.task.actions) > MANY_ACTIONS:
+        if refined is not None or len(self.task.actions) > MANY_ACTIONS:
             return None
-        return self.greedy(min(self.limits.nodes, size(best.tree.root) - 1))  # a larger one would not be kept
+        if options.prefer != "size" and (not self.task.templates or options.retries == "least"):
+            return None
+        # A larger one would not be kept.
+        fewer = options.prefer == "size" or (options.prefer == "success" and best.recovers is not None)
+        return self.greedy(best.worth.nodes - 1 if fewer else allowance(best.worth.nodes))
 
     def greedy(self, most: int) -> Plan | None:
         """Greedy refinement within so many nodes."""
         if most < 1:
             return None
         try:
-            return _refined(self.task, self.target, self.limits, most, self.options)
+            return _refined(self.task, self.target, self.limits, min(most, self.limits.nodes), self.options)
         except LimitReached:  # not even the goal alone is small enough
             return None
 
@@ -303,7 +354,7 @@ def _best(task: Task, target: Fraction, limits: Limits, options: Options, refine
         return plan_policy(task, target, limits, _silent, options)
     auto = _Auto(task, target, limits, replace(options, retries="unbounded"))
     auto.run(refined)
-    return _with_findings(_bounded(auto.best, limits, options), auto.plans)
+    return _with_findings(_bounded(auto.best.plan, limits, options), auto.plans)
 
 
 def _bounded(plan: Plan, limits: Limits, options: Options) -> Plan:
@@ -338,7 +389,8 @@ def _with_repeats(plan: Plan, limits: Limits) -> Plan:
 
 def _refined(task: Task, target: Fraction, limits: Limits, nodes: int, options: Options) -> Plan:
     few = replace(limits, nodes=nodes, states=min(limits.states, _REFINE_STATES))
-    return refine(task, target, few, _silent, options)
+    plan = refine(task, target, few, _silent, options)
+    return _with_repeats(plan, limits) if plan.tree.status == "target-reached" else plan
 
 
 def _with_findings(kept: Plan, plans: list[Plan]) -> Plan:

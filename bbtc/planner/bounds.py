@@ -51,6 +51,11 @@ def task_value(
     reached. Limits make the bounds wider, up to 0 and 1."""
     from bbtc.planner.mdp.solve import best_within
 
+    if task.components and options.allow_guess:
+        from bbtc.planner.stopping import Stopping
+
+        stopping = Stopping.of(task, anywhere=True)
+        task = task if stopping is None else stopping.task
     steps = options.max_actions
     try:
         if steps is None:
@@ -115,7 +120,7 @@ def judged(plan: Plan, limits: Limits, options: Options = DEFAULTS) -> Plan:
         return plan
     lower, upper, interrupted = tree.success_probability, Fraction(1), False
     try:
-        value = task_value(tree.task, limits, options, target=tree.target)
+        value = task_value(tree.task, limits, replace(options, allow_guess=False), target=tree.target)
         lower, upper, interrupted = max(lower, value.lower), value.upper, value.interrupted
     except (LimitReached, MemoryError):
         pass

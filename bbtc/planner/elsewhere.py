@@ -11,12 +11,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
+from bbtc.belief.absorption import Absorption
+from bbtc.belief.chain import Chain
 from bbtc.belief.draws import Values
 from bbtc.belief.state import initial_belief
+from bbtc.belief.tick import NodeStatus
 from bbtc.ground.task import InitialState, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.changing_facts import ChangingFacts
+from bbtc.planner.objective import Elsewhere
 
 MOST_VISITED = 40
 """States in which all that may change is looked at."""
@@ -26,6 +30,22 @@ MOST_STARTS = 100
 
 _SHARE = Fraction(1, 1000)
 _LOOK = 100  # states between two looks at the clock
+
+
+def elsewhere_of(chain: Chain, own: Chain | None) -> Elsewhere:
+    """What becomes of the runs of a chain that begins in such states; ``own`` is the tree's own chain."""
+    expected = set() if own is None else {own.states[number].values for number in own.final}
+    visits = Absorption(chain).visits()
+    success = given_up = Fraction(0)
+    for number in chain.final:
+        match chain.status[number]:
+            case NodeStatus.SUCCESS:
+                success += visits[number] or 0
+            case NodeStatus.FAILURE if chain.states[number].values not in expected:
+                given_up += visits[number] or 0
+            case _:
+                pass
+    return Elsewhere(success, given_up)
 
 
 def starts_elsewhere(task: Task, limits: Limits, visited: Iterable[Values] = ()) -> list[tuple[Truth, ...]]:

@@ -10,7 +10,12 @@ size    the fewest nodes, then the highest success probability, then the least e
 ======= ============================================================================================
 
 Of trees that are equal but for their nodes, one that succeeds more often from where others may leave the
-world (:mod:`bbtc.planner.elsewhere`) is better, whatever its size.
+world (:mod:`bbtc.planner.elsewhere`) is better, whatever its size; then one that gives up there less often.
+Others may change any fact to any value that it can take, so the goal is never out of their reach: where
+nothing that a robot can do leads to it, a tree that waits still gets there once others have put things right,
+and one that ended in failure does not. Where its own runs end in failure, a tree does not give up: there it
+tells that nothing can be done, which its success probability counts already. Both figures are exact, over
+the states that were looked at, each as likely as any other.
 
 The first two look no further than at trees within an allowance of nodes over the smallest one that meets the
 target (:func:`allowance`).
@@ -39,17 +44,31 @@ def allowance(smallest: int) -> int:
 
 
 @dataclass(frozen=True, slots=True)
+class Elsewhere:
+    """What becomes of a tree's runs from where others may leave the world: how probably they succeed, and how
+    probably they give up, which is to end in failure in a state in which no run of the undisturbed world
+    ends."""
+
+    success: Fraction = Fraction(0)
+    given_up: Fraction = Fraction(1)
+
+
+UNSEEN = Elsewhere()
+"""Of a tree whose runs from there were not looked at: the worst."""
+
+
+@dataclass(frozen=True, slots=True)
 class Worth:
-    """What counts of a tree; ``cost`` None is infinite; ``elsewhere`` is how often it succeeds from where
-    others may leave the world."""
+    """What counts of a tree; ``cost`` None is infinite; ``elsewhere`` is what it does from where others may
+    leave the world."""
 
     success: Fraction
     cost: Fraction | None
     nodes: int
-    elsewhere: Fraction = Fraction(0)
+    elsewhere: Elsewhere = UNSEEN
 
     @classmethod
-    def of(cls, plan: Plan, elsewhere: Fraction = Fraction(0)) -> Worth:
+    def of(cls, plan: Plan, elsewhere: Elsewhere = UNSEEN) -> Worth:
         """Of a plan's tree."""
         return cls(plan.figures.success, plan.figures.cost, size(plan.tree.root), elsewhere)
 
@@ -77,8 +96,12 @@ def best_of(worths: Sequence[Worth], target: Fraction, prefer: Prefer) -> int:
 
 
 def _by_success(worth: Worth) -> _Key:
-    return (-worth.success, worth.cost is None, worth.cost or Fraction(0), -worth.elsewhere, worth.nodes)
+    return (-worth.success, worth.cost is None, worth.cost or Fraction(0), *_at_last(worth))
 
 
 def _by_cost(worth: Worth) -> _Key:
-    return (worth.cost is None, worth.cost or Fraction(0), -worth.success, -worth.elsewhere, worth.nodes)
+    return (worth.cost is None, worth.cost or Fraction(0), -worth.success, *_at_last(worth))
+
+
+def _at_last(worth: Worth) -> _Key:
+    return (-worth.elsewhere.success, worth.elsewhere.given_up, worth.nodes)

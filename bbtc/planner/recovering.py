@@ -9,7 +9,9 @@
    reads its precondition by itself, so a rule tells apart only states in which that is not false, and most
    rules need no test at all. What a rule decides must leave a way to the goal from everywhere; choices that
    would not are given up. States that no run visits any more are free to take what is near enough.
-5. Last come rules for states without hope that only others lead to: an action, if possible one that the tree
+5. Where runs end since nothing leads to the goal any more, rules must not go on. Either each of them tells
+   such states apart, or one condition before them all does, whichever takes fewer nodes.
+6. Last come rules for states without hope that only others lead to: an action, if possible one that the tree
    has, is tried until others have put things right.
 """
 
@@ -18,13 +20,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import LimitReached
-from bbtc.ground.condition import FALSE, TRUE, conjuncts
+from bbtc.ground.condition import (
+    FALSE,
+    TRUE,
+    Condition,
+    conjunction,
+    conjuncts,
+    disjunction,
+    negation,
+)
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -32,7 +43,7 @@ from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.planner.elsewhere import MOST_VISITED, also_at, changed, spread
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.graph import draw_probabilities, sums
-from bbtc.planner.mdp.maxprob import MaxProb, max_prob
+from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.packing import Flags, bit_test, holds
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.mdp.state_space import StateSpace
@@ -40,7 +51,7 @@ from bbtc.planner.mdp.transitions import Index
 from bbtc.planner.strong_cyclic.rules import certainly
 from bbtc.planner.strong_cyclic.sharing import Guarded, factored
 from bbtc.planner.synthesis.rules import Literal, Stated, literals_of, rule_size, separating
-from bbtc.rewrite.simplify import numbered
+from bbtc.rewrite.simplify import numbered, size
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
 _NEAR = 1.5
@@ -58,26 +69,42 @@ _FEW_STATES = 2_000
 """Where there are no more, all that may change is looked at in each of them, again and again."""
 
 
-def recovering_tree(task: Task, limits: Limits) -> Node | None:
-    """A tree of the least expected cost among those of the best success probability, which does what it can
-    from anywhere else; None where costs are not known. Raises ``LimitReached``."""
-    space = _wide_space(task, limits)
+@dataclass(frozen=True, slots=True)
+class Recovering:
+    """A tree of the least expected cost among those of the best success probability, which is in ``bounds``.
+    It does what it can from every state that was looked at; ``everywhere``: these are all that any actions
+    and any changes lead to."""
+
+    root: Node
+    bounds: Bounds
+    everywhere: bool
+
+
+def recovering_tree(task: Task, limits: Limits, *, everywhere: bool = False) -> Recovering | None:
+    """A tree that does what it can from anywhere; None where costs are not known. Raises ``LimitReached``,
+    and with ``everywhere`` also where not all states are looked at."""
+    space, all_of_them = _wide_space(task, limits, everywhere=everywhere)
     found = max_prob(space, limits)
     choices = _choices(found, limits)
     if choices is None:
         return None
-    learner = _Learner(task, found, choices, limits)
-    return _tree(task, [*learner.deciding(), *learner.waiting()])
+    trees = []
+    for apart in (False, True):
+        learner = _Learner(task, found, choices, limits, apart=apart)
+        trees.append(_tree(task, learner.stated_ends(), list(learner.deciding()), learner.waiting()))
+        if not learner.stuck.any():
+            break
+    return Recovering(min(trees, key=size), found.initial, all_of_them)
 
 
-def _wide_space(task: Task, limits: Limits) -> StateSpace:
+def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateSpace, bool]:
     """All that any actions lead to, also behind the goal and from where others may leave some states, all of
-    them if they are few. Choices of goal states are left out. Raises ``LimitReached``."""
+    them if they are few; is that everything? Choices of goal states are left out. Raises ``LimitReached``."""
     endless = replace(task, goal=FALSE)
     space = _whole(endless, limits)
     facts = ChangingFacts.of(task, limits)
     own = initial_belief(task)
-    wider = endless
+    wider, all_of_them = endless, False
     while True:
         states = [space.packing.values(space.states, row) for row in range(len(space.states))]
         few = len(states) <= _FEW_STATES
@@ -85,11 +112,14 @@ def _wide_space(task: Task, limits: Limits) -> StateSpace:
         starts = changed(facts, states if few else spread(states, MOST_VISITED), limits)
         new = [tuple(map(Truth, values)) for values in starts if values not in known]
         if not new:
+            all_of_them = few
             break
         wider = also_at(endless, [*[each.values for each in wider.initial[len(endless.initial) :]], *new])
         try:
             space = _whole(wider, limits)
         except LimitReached:
+            if everywhere:
+                raise
             limits.check_time("the search for a tree that recovers")
             break
         if not few:
@@ -98,7 +128,7 @@ def _wide_space(task: Task, limits: Limits) -> StateSpace:
     goal = holds(space.packing, bit_test(space.packing, task.goal), space.states)
     kept = ~goal[space.choice_state]
     edges = kept[space.edge_choice]
-    return replace(
+    wide = replace(
         space,
         task=task,
         goal=goal,
@@ -109,6 +139,7 @@ def _wide_space(task: Task, limits: Limits) -> StateSpace:
         edge_draw=space.edge_draw[edges],
         initial=tuple((probability, numbers[values]) for values, probability in own.items()),
     )
+    return wide, all_of_them
 
 
 def _whole(task: Task, limits: Limits) -> StateSpace:
@@ -164,7 +195,7 @@ class _Rule:
 class _Learner:
     """Finds the rules."""
 
-    def __init__(self, task: Task, found: MaxProb, choices: _Choices, limits: Limits) -> None:
+    def __init__(self, task: Task, found: MaxProb, choices: _Choices, limits: Limits, *, apart: bool) -> None:
         self.task, self.choices, self.limits = task, choices, limits
         self.graph, self.space = found.graph, found.space
         space = found.space
@@ -180,6 +211,25 @@ class _Learner:
         self.undecided = self.hopeful.copy()
         self.rules: list[_Rule] = []
         self._starts: dict[int, Flags] = {}
+        self.stuck = self._stuck(self._visited())
+        """Where runs may end without the goal."""
+        self.ends = self._ending() if apart else []
+        """Tests of which some hold where rules are not asked."""
+        self.asked = np.ones(len(values), dtype=np.bool_)
+        for tests in self.ends:
+            self.asked &= ~self.holds[:, tests].all(axis=1)
+
+    def _stuck(self, visited: Flags) -> Flags:
+        return visited & ~self.hopeful & ~self.space.goal
+
+    def _ending(self) -> list[tuple[int, ...]]:
+        """Conjunctions of which some hold in each state in which runs end, and none where there is hope."""
+        left, found = self.stuck.copy(), []
+        while left.any():
+            tests = separating(self.holds[left], self.holds[self.hopeful], np.zeros(len(self.literals)))
+            left &= ~self.holds[:, tests].all(axis=1)
+            found.append(tuple(tests))
+        return found
 
     # --- what may be chosen where -----------------------------------------------------------------
 
@@ -214,8 +264,7 @@ class _Learner:
         while True:
             self.limits.check_time("the search for a tree that recovers")
             taken = self._taken(self.decided, visited)
-            stuck = visited & ~self.hopeful & ~self.space.goal
-            found = self._best(taken, stuck)
+            found = self._best(taken, self._stuck(visited) & self.asked)
             if found is None:
                 return
             rule, covered = found
@@ -261,22 +310,37 @@ class _Learner:
                 best = key, _Rule(tuple(tests), action), covered
         return None if best is None else best[1:]
 
-    def waiting(self) -> Iterator[tuple[tuple[Literal, ...], int]]:
+    def waiting(self) -> list[tuple[tuple[Literal, ...], int]]:
         """Rules for states without hope that no run visits; first of actions that the tree has."""
         visited = self._visited()
-        stuck = visited & ~self.hopeful & ~self.space.goal
+        stuck = self._stuck(visited)
         idle = ~self.hopeful & ~self.space.goal & ~visited
         for rule in self.rules:
-            idle &= ~(self.holds[:, rule.tests].all(axis=1) & self._may_start(rule.action))
+            idle &= ~(self.asked & self._applies(rule))
+        rules: list[_Rule] = []
+        left = idle.copy()
         used = {rule.action for rule in self.rules}
         for actions in (sorted(used), [a for a in range(len(self.task.actions)) if a not in used]):
             while True:
-                found = self._best_wait(actions, idle, stuck)
+                found = self._best_wait(actions, left, stuck)
                 if found is None:
                     break
                 rule, covered = found
-                idle &= ~covered
-                yield self._stated(rule)
+                left &= ~covered
+                rules.append(rule)
+        for rule in list(rules):  # what later ones made needless
+            covered = np.zeros(len(idle), dtype=np.bool_)
+            for other in rules:
+                if other is not rule:
+                    covered |= self._applies(other)
+            if not (idle & ~left & ~covered).any():
+                rules.remove(rule)
+        return [self._stated(rule) for rule in rules]
+
+    def _applies(self, rule: _Rule) -> Flags:
+        """Where a rule has its action started, if it is asked."""
+        found: Flags = self.holds[:, rule.tests].all(axis=1) & self._may_start(rule.action)
+        return found
 
     def _best_wait(self, actions: list[int], idle: Flags, stuck: Flags) -> tuple[_Rule, Flags] | None:
         best: tuple[float, _Rule, Flags] | None = None
@@ -292,17 +356,47 @@ class _Learner:
                 best = key, _Rule(tuple(tests), action), covered
         return None if best is None else best[1:]
 
+    def stated_ends(self) -> list[tuple[Literal, ...]]:
+        """The same as literals."""
+        return [tuple(self.literals[test] for test in tests) for tests in self.ends]
+
     def _stated(self, rule: _Rule) -> tuple[tuple[Literal, ...], int]:
         return tuple(self.literals[test] for test in rule.tests), rule.action
 
 
-def _tree(task: Task, rules: list[tuple[tuple[Literal, ...], int]]) -> Node:
-    """The rules as a tree. Nothing that is read is ever unknown, but for an action's precondition."""
-    found: list[Guarded] = []
-    for tests, number in rules:
-        action = task.actions[number]
-        node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
-        needed = [certainly(task, literal.condition) for literal in tests]
-        found.append((tuple(part for each in needed for part in conjuncts(each)), node))
+_Stated: TypeAlias = tuple[tuple[Literal, ...], int]
+"""Start an action where these hold."""
+
+
+def _tree(task: Task, ends: list[tuple[Literal, ...]], rules: list[_Stated], waiting: list[_Stated]) -> Node:
+    """The rules as a tree, the first of them only where none of ``ends`` holds. Nothing that is read is ever
+    unknown, but for an action's precondition."""
     goal = ConditionNode("", certainly(task, task.goal))
-    return numbered(ControlNode("", "fallback", (goal, *factored(task, found))) if found else goal)
+    last = _merged([_guarded(task, rule) for rule in waiting])
+    if not ends or not rules:
+        branches = factored(task, [*[_guarded(task, rule) for rule in rules], *last])
+    else:
+        going_on = conjunction(
+            negation(conjunction(certainly(task, literal.condition) for literal in tests)) for tests in ends
+        )
+        inner = factored(task, [_guarded(task, rule) for rule in rules])
+        first = inner[0] if len(inner) == 1 else ControlNode("", "fallback", tuple(inner))
+        branches = [ControlNode("", "sequence", (ConditionNode("", going_on), first))]
+        branches += factored(task, last)
+    return numbered(ControlNode("", "fallback", (goal, *branches)) if branches else goal)
+
+
+def _guarded(task: Task, rule: _Stated) -> Guarded:
+    tests, number = rule
+    action = task.actions[number]
+    node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
+    needed = [certainly(task, literal.condition) for literal in tests]
+    return tuple(part for each in needed for part in conjuncts(each)), node
+
+
+def _merged(rules: list[Guarded]) -> list[Guarded]:
+    """Rules whose order does not matter, one for each action."""
+    needed: dict[ActionNode, list[Condition]] = {}
+    for guards, action in rules:
+        needed.setdefault(action, []).append(conjunction(guards))
+    return [(conjuncts(disjunction(own)), action) for action, own in needed.items()]

@@ -52,7 +52,7 @@ STRATEGIES = {
     "advised": Entry("bbtc.planner.auto", "plan_advised", max_actions=True, retries=True),
 }
 
-DEFAULT = "advised"
+DEFAULT = "auto"
 
 
 def others(those: Callable[[Entry], bool] = lambda _: True) -> str:

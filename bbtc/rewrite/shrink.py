@@ -85,7 +85,8 @@ class _Worth:
         cost = Fraction(0)
         for visit, edges in zip(visits, chain.edges, strict=True):
             cost += (visit or 0) * sum((e.result.probability * e.result.cost for e in edges), Fraction(0))
-        return cls(ends[NodeStatus.SUCCESS], endless, None if endless else cost)
+        success = sum(((visits[state] or 0) * chain.won(state) for state in chain.final), Fraction(0))
+        return cls(success, endless, None if endless else cost)
 
     def will_do(self, before: _Worth, target: Fraction) -> bool:
         """Is it good enough in place of what was before?"""

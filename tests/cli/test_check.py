@@ -138,10 +138,11 @@ def test_two_domains_of_one_name_are_both_checked(folder: Path) -> None:
 NOT_YET = """(define (domain look)
   (:requirements :contingent)
   (:predicates (unknown (seen)) (here) (there))
-  (:action look :precondition (unknown (seen)) :observe (seen))
-  (:action go :precondition (here) :effect (there)))
+  (:action look :precondition (unknown (seen)) :observe (probabilistic 0.9 (and (seen) (here))))
+  (:action go :precondition (here) :effect (there))
+  (:sensor eye :sensed (here)))
 (define (problem p) (:domain look)
-  (:init (unknown (seen)) (oneof (here) (there)) (or (here) (there)))
+  (:init (unknown (seen)) (oneof (here) (there)) (invariant (here) (there)))
   (:metric minimize (total-cost)))
 """
 
@@ -151,11 +152,37 @@ def test_what_compile_will_refuse_is_noted(tmp_path: Path) -> None:
     (tmp_path / "look.pddl").write_text(NOT_YET)
     status, checked = bbtc("check", "look.pddl", folder=tmp_path)
     noted = set(re.findall(r"(\S+): note\[(BBT04\d\d)\]", checked))
-    assert {code for _, code in noted} == {"BBT0404", "BBT0405", "BBT0406", "BBT0411"}
+    assert {code for _, code in noted} == {"BBT0405", "BBT0406", "BBT0407", "BBT0411"}
     assert status == 0
     status, compiled = bbtc("compile", "look.pddl", folder=tmp_path)
     assert set(re.findall(r"(\S+): error\[(BBT04\d\d)\]", compiled)) == noted
     assert status == 1
+
+
+HIDING = """(define (domain chest)
+  (:requirements :contingent :conditional-effects :disjunctive-preconditions)
+  (:predicates (gold ?x) (lead ?x) (rich))
+  (:action look :parameters (?x) :observe (gold ?x))
+  (:action take :parameters (?x) :precondition (or (gold ?x) (lead ?x)) :effect (when (gold ?x) (rich))))
+(define (problem two) (:domain chest) (:objects a b)
+  (:init (oneof (gold a) (lead a)) (oneof (gold b) (lead b)){}) (:goal (rich)))
+"""
+
+
+def test_what_is_hidden_is_told_with_its_groups(tmp_path: Path) -> None:
+    (tmp_path / "chest.pddl").write_text(HIDING.format(""))
+    status, messages = bbtc("check", "chest.pddl", folder=tmp_path)
+    assert status == 0
+    # Whether one is rich depends on both.
+    assert "chest/two: 5 hidden facts in 1 component\n" in messages
+    assert "  gold(a), gold(b), lead(a), lead(b), rich(): 4 worlds\n" in messages
+
+
+def test_a_start_that_contradicts_itself_is_an_error_of_a_check(tmp_path: Path) -> None:
+    (tmp_path / "chest.pddl").write_text(HIDING.format(" (not (gold a)) (not (lead a))"))
+    status, messages = bbtc("check", "chest.pddl", folder=tmp_path)
+    assert status == 1
+    assert re.findall(r"(\S+): error\[(BBT\d+)\]", messages) == [("chest.pddl:7:10", "BBT0414")]
 
 
 # --- root causes -----------------------------------------------------------------------------
@@ -265,10 +292,11 @@ def test_a_goal_too_large_to_look_into_is_judged_by_predicates_alone(
 def test_a_goal_of_what_cannot_be_compiled_yet_is_judged_by_predicates_alone(tmp_path: Path) -> None:
     domain = """(define (domain d) (:requirements :typing :unknown) (:predicates (shut) (done) (other))
       (:action look :precondition (unknown (shut)) :observe (shut))
+      (:sensor eye :sensed (shut))
       (:action act :precondition (shut) :effect (done)))
       (define (problem x) (:domain d) (:init (unknown (shut))) (:goal {}))"""
     for goal, warned in (("(done)", False), ("(other)", True)):
         (tmp_path / "look.pddl").write_text(domain.format(goal))
         _, messages = bbtc("check", "look.pddl", folder=tmp_path)
         assert ("BBT0316" in messages) is warned
-        assert "BBT0406" in messages
+        assert "BBT0407" in messages

@@ -179,7 +179,7 @@ def test_runs_are_cut_at_the_bound_on_ticks() -> None:
 
 def test_a_tree_from_a_file_is_run_with_the_actions_of_the_task_where_that_is_given() -> None:
     domain, problem = DOMAINS / "household" / "domain.pddl", DOMAINS / "household" / "grasp-soda.pddl"
-    tree = bbtc.plan(domain, problem).tree
+    tree = bbtc.plan(domain, problem, strategy="refine").tree
     task = bbtc.compile(domain, problem)
     read = bbtc.load_tree(bbtc.SourceFile("tree.json", bbtc.dumps(tree)))
     assert len(read.task.actions) < len(task.actions)

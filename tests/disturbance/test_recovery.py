@@ -151,7 +151,7 @@ def test_a_task_out_of_reach_has_no_state_to_recover_from() -> None:
 
 def test_the_command_writes_the_same(tmp_path: Path) -> None:
     domain, problem = files("household/grasp-soda")
-    tree = bbtc.plan(domain, problem).tree
+    tree = bbtc.plan(domain, problem, strategy="refine").tree
     (tmp_path / "tree.json").write_text(bbtc.dumps(tree), "utf-8")
     own = program("simulate", tmp_path / "tree.json", "--recovery", "--json")
     all_actions = program("simulate", tmp_path / "tree.json", domain, problem, "--recovery", "--json")

@@ -92,7 +92,8 @@ def test_the_household_refines_as_in_the_paper() -> None:
 
 
 def test_the_household_says_so() -> None:
-    done = bbtc("plan", *Problem("household", "look-for-soda").files)
+    problem = Problem("household", "look-for-soda")
+    done = bbtc("plan", *problem.files, *problem.switches)
     assert done.status == 0
     assert "target 9/10 (0.9) reached: success probability 31/32 (0.96875)" in done.err
 

@@ -280,8 +280,8 @@ def test_an_unreachable_goal_tells_that_only_others_could_help() -> None:
 @pytest.mark.parametrize(
     ("init", "code", "place"),
     [
-        ("(oneof (p a) (p b))", "BBT0404", "(oneof (p a) (p b))"),
-        ("(or (p a) (p b))", "BBT0405", "(or (p a) (p b))"),
+        ("(or (known (p a)) (p b))", "BBT0405", "(or (known (p a)) (p b))"),
+        ("(oneof (p a) (p b)) (not (p a)) (not (p b))", "BBT0414", "(oneof (p a) (p b))"),
         (
             " ".join(
                 f"(probabilistic 0.5 (on {x} {y}) 0.25 (unknown (on {x} {y})))" for x in "abc" for y in "abc"
@@ -295,8 +295,9 @@ def test_starts_that_cannot_be_grounded_yet_are_refused_by_name(init: str, code:
     assert [each[:2] for each in _errors(f"(q) {init}", "(p a)")] == [(code, place)]
 
 
-def test_observations_are_refused_by_name() -> None:
-    text = """(define (domain d) (:predicates (p)) (:action look :observe (p)) (:action a :effect (p)))
+def test_noise_of_several_facts_is_refused_by_name() -> None:
+    text = """(define (domain d) (:predicates (p) (q))
+          (:action look :observe (probabilistic 0.9 (and (p) (q)))) (:action a :effect (p)))
         (define (problem x) (:domain d) (:init) (:goal (p)))"""
     with pytest.raises(BbtcError) as caught:
         task_of(text)

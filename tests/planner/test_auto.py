@@ -14,18 +14,20 @@ from bbtc.belief.chain import explore
 from bbtc.belief.simulate import success_of
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick
 from bbtc.diagnostics import Report
-from bbtc.ground.condition import Is, evaluate
+from bbtc.ground.condition import And, Is, evaluate
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
-from bbtc.planner.elsewhere import only_at, starts_elsewhere
-from bbtc.planner.objective import Worth, allowance, best_of
+from bbtc.planner.best_tree import BestTree
+from bbtc.planner.elsewhere import elsewhere_of, only_at, starts_elsewhere
+from bbtc.planner.objective import UNSEEN, Elsewhere, Worth, allowance, best_of
 from bbtc.planner.options import Options, Prefer
 from bbtc.planner.result import Plan, Refinement
 from bbtc.planner.strategies import DEFAULT
+from bbtc.rewrite.simplify import numbered
 from bbtc.source import SourceFile
-from bbtc.tree.nodes import actions_of, retries_of, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, actions_of, retries_of, walk
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
@@ -79,10 +81,12 @@ def test_auto_is_no_worse_than_the_other_strategies(of: Task, prefer: Prefer) ->
             assert best_of(worths, Fraction("0.9"), prefer) == 0
 
 
-def from_elsewhere(of: Task, done: Plan) -> Fraction:
-    """How often a tree succeeds from where others may leave the world."""
+def from_elsewhere(of: Task, done: Plan) -> Elsewhere:
+    """What a tree does from where others may leave the world."""
     starts = starts_elsewhere(of, Limits())
-    return success_of(explore(only_at(of, starts), done.tree.root, Limits())) if starts else Fraction(0)
+    if not starts:
+        return UNSEEN
+    return elsewhere_of(explore(only_at(of, starts), done.tree.root, Limits()), done.chain)
 
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
@@ -113,17 +117,48 @@ def test_what_is_out_of_reach_is_said_with_the_best_tree() -> None:
     assert done.tree.success_probability == Fraction(1, 2)
 
 
-def test_by_default_the_templates_of_a_domain_are_followed_if_that_reaches_the_target() -> None:
+def test_where_advice_is_taken_templates_are_followed_if_that_reaches_the_target() -> None:
     """In the household; not in the doors, which have none, nor where only another tree is good enough."""
     soda, doors = (task_of(p) for p in PROBLEMS if str(p) in {"household/look-for-soda", "doors/to-the-lab"})
     if not soda.templates:
         soda, doors = doors, soda
-    assert plan(soda, DEFAULT).tree.root == plan(soda, "refine").tree.root
-    assert plan(soda, "auto").tree.root != plan(soda, "refine").tree.root
-    assert plan(doors, DEFAULT).tree.root == plan(doors, "auto").tree.root
-    sure = plan(soda, DEFAULT, "1")
+    assert plan(soda, "advised").tree.root == plan(soda, "refine").tree.root
+    assert plan(soda, DEFAULT).tree.root != plan(soda, "refine").tree.root
+    assert plan(doors, "advised").tree.root == plan(doors, DEFAULT).tree.root
+    sure = plan(soda, "advised", "1")
     assert sure.tree.success_probability == plan(soda, "auto", "1").tree.success_probability
     assert sure.tree.success_probability > plan(soda, "refine", "1").tree.success_probability
+
+
+def test_refinement_is_one_of_those_that_are_compared() -> None:
+    """A robot that looks for the can twice and no more pays less than one that goes on until it is seen."""
+    (soda,) = (task_of(p) for p in PROBLEMS if str(p) == "household/look-for-soda")
+    cheap = plan(soda, DEFAULT, "0.8", prefer="cost")
+    assert (cheap.figures.success, cheap.figures.cost) == (Fraction(7, 8), Fraction(7, 2))
+    assert [step.inserted for step in cheap.refinements] == ["detect(soda)", "light_on()", "find(soda)"]
+    assert plan(soda, DEFAULT, "0.8").figures.cost == 4
+
+
+@pytest.mark.parametrize("problem", [p for p in PROBLEMS if task_of(p).templates], ids=str)
+def test_templates_are_followed_where_nothing_is_better(problem: Problem) -> None:
+    of = task_of(problem)
+    worths = [Worth.of(each, from_elsewhere(of, each)) for each in (plan(of, DEFAULT), plan(of, "advised"))]
+    assert best_of(worths, of.goal_probability, "success") == 0
+
+
+def test_what_is_proven_to_be_best_and_small_needs_no_other_opinion(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> Plan:
+        raise AssertionError("a second opinion")
+
+    monkeypatch.setattr("bbtc.planner.auto.plan_search", none)
+    (soda,) = (task_of(p) for p in PROBLEMS if str(p) == "household/look-for-soda")
+    done = plan(soda, DEFAULT)
+    assert (done.figures.success, done.figures.cost, done.tree.bounds) == (1, 4, (1, 1))
+    for prefer in ("cost", "size"):  # a smaller success may be cheaper, and another tree smaller
+        with pytest.raises(AssertionError, match="a second opinion"):
+            plan(soda, DEFAULT, prefer=prefer)
+    with pytest.raises(AssertionError, match="a second opinion"):
+        plan_task(soda, None, DEFAULT, Limits(states=2), lambda _: None)
 
 
 def test_a_large_tree_is_worth_a_longer_second_opinion(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -176,6 +211,45 @@ def test_of_trees_that_meet_the_target_the_one_preferred_is_taken(prefer: Prefer
 def test_where_none_meets_the_target_success_counts_most(prefer: Prefer) -> None:
     trees = [worth("1/2", 1, 1), worth("3/4", 9, 900), worth("3/4", 8, 901), worth("3/4", 8, 902)]
     assert best_of(trees, Fraction(4, 5), prefer) == 2
+
+
+LOCKED, OPEN, JAMMED = 0, 1, 2
+DOOR = task(
+    "locked open jammed",
+    {},
+    Is(OPEN, T),
+    action("push", And((Is(LOCKED, F), Is(JAMMED, F))), ("9/10", {OPEN: T}), ("1/10", {JAMMED: T})),
+    action("knock", Is(LOCKED, T), ("1", {})),
+)
+"""Nobody but others locks the door, and unlocks it; pushing it may jam it for good."""
+
+
+def test_to_wait_is_worth_a_node_where_only_others_can_help() -> None:
+    """From a locked door, a jammed one and an open one, each as likely: the tree that does not knock gives up
+    at the locked one. At the jammed one both end, but runs that nobody disturbed end there, too."""
+
+    def done(*actions: str) -> Plan:
+        leaves = [ActionNode("", f"{name}()", latched=False, guarded=True) for name in actions]
+        root = numbered(ControlNode("", "fallback", (ConditionNode("", DOOR.goal), *leaves)))
+        chain = explore(DOOR, root, Limits())
+        found = BestTree(DOOR, Fraction(1, 2))
+        found.take(root, chain, success_of(chain))
+        return found.plan("stuck")
+
+    starts = [(T, F, F), (F, F, T), (F, T, F)]
+    worths = []
+    for each in (done("push"), done("push", "knock")):
+        elsewhere = elsewhere_of(explore(only_at(DOOR, starts), each.tree.root, Limits()), each.chain)
+        worths.append(Worth.of(each, elsewhere))
+    assert [each.elsewhere for each in worths] == [
+        Elsewhere(Fraction(1, 3), given_up=Fraction(1, 3)),
+        Elsewhere(Fraction(1, 3), given_up=Fraction(0)),
+    ]
+    assert [each.nodes for each in worths] == [3, 4]
+    for prefer in ("success", "cost"):
+        assert best_of(worths, Fraction(1, 2), prefer) == 1
+    assert best_of(worths, Fraction(1, 2), "size") == 0
+    assert {each.action for each in actions_of(plan(DOOR, DEFAULT).tree.root)} == {"push()", "knock()"}
 
 
 WARD = """

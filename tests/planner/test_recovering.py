@@ -21,7 +21,7 @@ from bbtc.limits import Limits
 from bbtc.planner.bounds import task_value
 from bbtc.planner.guard import guarded
 from bbtc.planner.recovering import recovering_tree
-from bbtc.tree.nodes import ActionNode, ControlNode
+from bbtc.tree.nodes import ActionNode, ControlNode, Node
 from bbtc.verifier.verdict import verify
 from tests.disturbance.reference import Exact, best_chances, reachable
 from tests.domains.problems import PROBLEMS, Problem, task_of
@@ -36,15 +36,21 @@ T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 LARGE = ("service-robot", "hospital")
 
 
+def tree_of(task: Task) -> Node:
+    found = recovering_tree(task, Limits())
+    assert found is not None
+    return found.root
+
+
 @examples(amount(80, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) -> None:
-    root = recovering_tree(of, Limits())
+    found = recovering_tree(of, Limits())
     states = reachable(of)
-    if root is None or states is None:
+    if found is None or states is None:
         return
     best = best_chances(of, states)
-    attained = Exact(of, root, 0.0, lambda state: []).success_from(states, 3000)
+    attained = Exact(of, found.root, 0.0, lambda state: []).success_from(states, 3000)
     for state in states:
         assert attained[state] == pytest.approx(best[state], abs=1e-6)
 
@@ -52,12 +58,12 @@ def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) ->
 @examples(amount(80, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
-    root = recovering_tree(of, Limits())
-    if root is None:
+    found = recovering_tree(of, Limits())
+    if found is None:
         return
     value = task_value(of, Limits(), costs=True)
-    done = figures(of, root, explore(of, root, Limits()))
-    assert done.success == value.lower
+    done = figures(of, found.root, explore(of, found.root, Limits()))
+    assert done.success == value.lower == found.bounds.exact
     assert done.cost is not None
     assert value.cost is not None
     assert done.cost == pytest.approx(value.cost, abs=1e-9)
@@ -84,7 +90,7 @@ def test_rules_need_no_test_where_the_guards_of_their_actions_tell() -> None:
         action("back", Is(2, T), ("1", {2: F, 0: T})),
     ]
     of = task("a b c", {0: T}, Is(2, T), *goes)
-    root = recovering_tree(of, Limits())
+    root = tree_of(of)
     assert isinstance(root, ControlNode)
     found = [rule for rule in root.children if isinstance(rule, ActionNode) and rule.guarded]
     assert {rule.action for rule in found} == {"first()", "second()"}
@@ -97,16 +103,14 @@ def test_where_only_others_can_help_it_tries_again() -> None:
     lock = action("lock", Is(1, T), ("1", {0: T, 1: F}))
     knock = action("knock", Is(0, T), ("1", {2: T}))
     of = task("locked open heard", {}, Is(1, T), pull, lock, knock)
-    root = recovering_tree(of, Limits())
-    assert root is not None
+    root = tree_of(of)
     tried = perturbed_runs(of, root, Fraction(1, 5), Limits(), runs=500)
     assert tried.success == 1
 
 
 def test_nothing_is_done_where_nothing_helps() -> None:
     of = task("a", {}, FALSE, action("vain", Is(0, F), ("1", {0: T})))
-    root = recovering_tree(of, Limits())
-    assert root is not None
+    root = tree_of(of)
     assert figures(of, root, explore(of, root, Limits())).cost == 0
 
 

@@ -15,7 +15,6 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task, simulate_tree
-from bbtc.planner.strategies import DEFAULT
 from bbtc.rewrite.repeat import with_repeats
 from bbtc.rewrite.simplify import numbered, size
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, retries_of
@@ -106,10 +105,10 @@ def test_neighbours_that_are_equal(before: Node, attempts: list[int], nodes_less
 
 
 @pytest.mark.parametrize("name", ["kitting/gift-set", "household/grasp-soda", "warehouse/one-order"])
-def test_the_default_puts_together_what_refinement_repeats(name: str) -> None:
+def test_what_refinement_repeats_is_put_together_where_its_advice_is_taken(name: str) -> None:
     (problem,) = (each for each in PROBLEMS if str(each) == name)
     published = plan_of(problem, "refine").tree
-    tree = plan_task(task_of(problem), None, DEFAULT, Limits(), lambda _: None).tree
+    tree = plan_task(task_of(problem), None, "advised", Limits(), lambda _: None).tree
     assert list(retries_of(tree.root))
     assert size(tree.root) < size(published.root)
     ours, theirs = (simulate_tree(each, Limits())[0] for each in (tree, published))

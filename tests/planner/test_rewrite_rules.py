@@ -195,6 +195,7 @@ def policy_of(text: str, of: Task = TASK) -> MultiPolicy:
         values=values_of,
         idle=np.zeros(len(states), dtype=np.bool_),
         initial=np.arange(len(states)),
+        beliefs=np.zeros((len(states), 0), dtype=np.uint32),
     )
 
 

@@ -54,5 +54,5 @@ def test_a_strategy_bounds_attempts_where_it_says_so(strategy: str) -> None:
 
 
 def test_help_names_the_other_strategies_and_those_that_know_an_option() -> None:
-    assert others() == "refine, search, policy, strong-cyclic, auto"
-    assert others(lambda entry: entry.retries) == "search, policy, auto"
+    assert others() == "refine, search, policy, strong-cyclic, advised"
+    assert others(lambda entry: entry.retries) == "search, policy, advised"

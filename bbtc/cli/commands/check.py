@@ -63,15 +63,17 @@ def command(
     is checked for syntax only, and a note says so. What rests on the problem, such as an action
     that it never needs, is a note; with several problems it is reported only if it holds for all of
     them, as a warning.
-    Errors are always shown. `bbtc explain CODE` tells more about a code.
+    Of hidden state it tells which facts are hidden, and how they are grouped. Errors are always shown. `bbtc
+    explain CODE` tells more about a code.
     """
     from bbtc.pipeline import check_documents, parse_all
 
     report = Report()
+    hidden: list[str] = []
     try:
         documents = parse_all([session.read(file) for file in files], report, session.limits)
         if not report.errors:
-            check_documents(documents, report, session.reading, session.limits)
+            hidden = check_documents(documents, report, session.reading, session.limits)
     finally:
         for diagnostic in chosen(report, sum(select, ()), sum(ignore, ())):
             session.report.add(diagnostic)
@@ -79,6 +81,8 @@ def command(
     found = [diagnostic.severity for diagnostic in session.report]
     warnings, notes = found.count(Severity.WARNING), found.count(Severity.NOTE)
     summary = f"{counted(len(files), 'file')} checked, {counted(warnings, 'warning')}"
+    for line in hidden:
+        session.say(line)
     session.say(summary + (f", {counted(notes, 'note')}" if notes else ""))
     return 1 if strict and warnings else 0
 

@@ -68,6 +68,11 @@ _TELLING = 1.0
     help="Leave out what is read only in case that others change the world, too.",
 )
 @click.option("--guarded", is_flag=True, help="The contrary of --closed-world, and the default.")
+@click.option(
+    "--allow-guess",
+    is_flag=True,
+    help="Let the tree succeed where the goal is believed, but hidden facts leave it open.",
+)
 @click.option("--bounds", is_flag=True, help="Print what any policy can reach, and plan nothing.")
 @click.option("--json", "as_json", is_flag=True, help="With --bounds: print it as JSON.")
 @click.option("--verify", "verified", is_flag=True, help="Write the tree only if `bbtc verify` takes it.")
@@ -86,6 +91,7 @@ def command(
     prefer: Prefer,
     closed_world: bool,
     guarded: bool,
+    allow_guess: bool,
     bounds: bool,
     as_json: bool,
     verified: bool,
@@ -113,7 +119,7 @@ def command(
     if closed_world and guarded:
         raise click.UsageError("--closed-world and --guarded contradict each other.")
     limits = session.limits
-    options = Options(max_actions, retries, prefer, closed_world)
+    options = Options(max_actions, retries, prefer, closed_world, allow_guess)
     require_strategy(strategy, options if not bounds else DEFAULTS)
     session.expect_output(output, files, check=check and not bounds, depfile=None if bounds else depfile)
     task = load_task(session, files, limits)

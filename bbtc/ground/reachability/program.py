@@ -129,12 +129,12 @@ class ProgramBuilder:
 
     def _action(self, index: int, schema: md.Schema) -> None:
         """Where an action can apply, what it may set, and where it may set anything. What a template
-        calls is kept even where it does nothing, so that the call can succeed."""
+        calls is kept even where it does nothing, so that the call can succeed, and so is what observes."""
         parameters, block = schema.parameters, self.usage.blocks[schema.name]
         self._bound(block, self._count(parameters))
         precondition = list(conjuncts(normal_form(schema.precondition)))
         found = list(all_groups(block))
-        kept = schema.name in self._called
+        kept = schema.name in self._called or schema.observe is not None
         if not kept and len(found) == 1 and not found[0].parameters:
             # Nothing happens where the only guard is false: it may as well be a precondition.
             precondition += found[0].guard

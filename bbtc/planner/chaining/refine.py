@@ -19,7 +19,6 @@ from fractions import Fraction
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
 from bbtc.belief.state import Transition
-from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.condition import evaluate
 from bbtc.ground.describe import describe
@@ -72,7 +71,7 @@ class _Refiner:
         chain = explore(self.task, frozen.root, self.limits, self.transitions)
         visits = Absorption(chain).visits()
         mass = {state: visits[state] or Fraction(0) for state in chain.final}
-        success = sum((p for s, p in mass.items() if chain.status[s] is NodeStatus.SUCCESS), Fraction(0))
+        success = sum((p * chain.won(state) for state, p in mass.items()), Fraction(0))
         goals = Fraction(0)
         if len(self.draft.goals) > 1:
             conditions = [goal.condition for goal in self.draft.goals]

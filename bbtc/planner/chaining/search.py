@@ -167,7 +167,7 @@ class _Search:
         absorption = Absorption(chain)
         visits = absorption.visits()
         ends = [(visits[state] or Fraction(0), state) for state in chain.final]
-        success = sum((p for p, state in ends if chain.status[state] is NodeStatus.SUCCESS), Fraction(0))
+        success = sum((p * chain.won(state) for p, state in ends), Fraction(0))
         failing = [(p, state) for p, state in ends if p and chain.status[state] is not NodeStatus.SUCCESS]
         endless = 1 - sum((p for p, _ in ends), Fraction(0))
         lost = sum((p for p, state in failing if not self.hopeful(chain.states[state].values)), Fraction(0))

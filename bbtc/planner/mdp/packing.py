@@ -131,11 +131,18 @@ class Packing:
     def values(self, states: Words, row: int) -> Values:
         """One state as the rest of the program keeps it."""
         values = bytes(self.unpack(states[row : row + 1])[0].tolist())
-        if not self.beliefs:
-            return values
+        return values + self._belief_bytes(states, row) if self.beliefs else values
+
+    def _belief_bytes(self, states: Words, row: int) -> bytes:
         bits = int.from_bytes(states[row].astype("<u8").tobytes(), "little") >> self._first_belief
-        beliefs = bits & (1 << BELIEF * self.beliefs) - 1
-        return values + beliefs.to_bytes(PLACES * self.beliefs, "big")
+        return (bits & (1 << BELIEF * self.beliefs) - 1).to_bytes(PLACES * self.beliefs, "big")
+
+    def belief_numbers(self, states: Words) -> npt.NDArray[np.uint32]:
+        """In each row, the number of what is believed of each component."""
+        import numpy as np
+
+        rows = b"".join(self._belief_bytes(states, row) for row in range(len(states) if self.beliefs else 0))
+        return np.frombuffer(rows, dtype=">u4").astype(np.uint32).reshape(len(states), self.beliefs)
 
 
 def set_bits(bits: int) -> Iterator[int]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import count
 
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
@@ -13,11 +14,15 @@ from bbtc.limits import Limits
 from bbtc.planner.mdp.bounded_search import Advice, search_bounds
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
+from bbtc.planner.mdp.fully_observable import fully_observable
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.state_space import StateSpace
 
 FEW_STATES = 100_000
 """A space with no more is explored as a whole."""
+
+FEW_BELIEFS = 2_000
+"""The same where there may be beliefs without end, whose weights have ever more digits."""
 
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space
 _BEFORE_VALUES = 1 / 2  # of the time, for exploration within a number of actions
@@ -58,6 +63,8 @@ def best_known(
     Raises ``LimitReached`` only if the time is over before anything was found, or with ``whole`` if
     the limits do not allow to explore the whole space.
     """
+    if task.endless_beliefs:
+        return _of_endless(task, limits, target, advice, whole=whole, verdict=verdict)
     few = limits if whole or costs else replace(limits, states=min(limits.states, FEW_STATES))
     space = explore_space(task, few if whole else few.part(_SHARE))
     if space.complete:
@@ -68,6 +75,49 @@ def best_known(
     del space  # two of them may be too much
     searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
     return Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+
+
+def _of_endless(
+    task: Task, limits: Limits, target: Fraction | None, advice: Advice | None, *, whole: bool, verdict: bool
+) -> Best:
+    """The same, where there may be beliefs without end."""
+    highest = _seeing_all(task, limits.part(_SHARE))
+    found = _nearest(task, limits.part(_SHARE), target)
+    if found is None:
+        if whole:
+            replace(limits, states=FEW_BELIEFS).check_states(FEW_BELIEFS + 1, "exploration")
+        searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
+        found = Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
+    bounds = Bounds(found.bounds.lower, max(found.bounds.lower, min(found.bounds.upper, highest)))
+    return replace(found, bounds=bounds)
+
+
+def _seeing_all(task: Task, limits: Limits) -> Fraction:
+    """An upper bound on P*: that of a robot that sees everything."""
+    seeing = fully_observable(task)
+    if seeing is None:
+        return Fraction(1)
+    try:
+        return best_known(seeing, limits).bounds.upper
+    except LimitReached:
+        return Fraction(1)
+
+
+def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None:
+    """The least space, by the number of actions, in which a policy reaches the target; or all of it. None
+    where neither is within reach: with beliefs without end, P* may be what no policy attains."""
+    few = replace(limits, states=min(limits.states, FEW_BELIEFS))
+    for depth in count(1):
+        space = explore_space(task, few, depth)
+        if space.stop is not None:
+            return None
+        found = max_prob(space, limits)
+        if space.complete:
+            return Best(found, found.initial)
+        if target is not None and found.initial.lower >= target:
+            upper = max_prob(space, limits, space.goal | space.fringe).initial.upper
+            return Best(found, Bounds(found.initial.lower, upper))
+    raise AssertionError("unreachable")
 
 
 @dataclass(frozen=True, slots=True)

@@ -80,21 +80,21 @@ class _Builder:
                 done.append(self._joined(item.test, done.pop(), done.pop()))
                 continue
             self.limits.check_time("the search for a small tree")
-            wanted = np.unique(self.label[item])
-            if len(wanted) < 2:
-                action = int(wanted[0]) if len(wanted) else _END
+            wanted, often = np.unique(self.label[item], return_counts=True)
+            column = self._best(item) if len(wanted) > 1 else None
+            if column is None:  # or what is believed differs, and nothing that can be read tells it
+                action = int(wanted[np.argmax(often)]) if len(wanted) else _END
                 leaf = (
                     None if action == _END else ActionNode("", self.task.actions[action].name, latched=False)
                 )
                 done.append((leaf, leaf is None))
                 continue
-            column = self._best(item)
             inside = self.holds[item, column]
             work.extend([_Branch(self.literals[column]), item[inside], item[~inside]])
         return done[0][0]
 
-    def _best(self, states: Index) -> int:
-        """The column of the test that tells most about the actions of some states."""
+    def _best(self, states: Index) -> int | None:
+        """The column of the test that tells most about the actions of some states; None if none does."""
         order = np.argsort(self.label[states], kind="stable")
         states = states[order]
         starts = np.flatnonzero(np.diff(self.label[states], prepend=-2))
@@ -107,7 +107,7 @@ class _Builder:
         usable &= ~(self.truth & doubtful[self.variable])
         rest = _entropy(true) + _entropy(false)
         rest[~usable] = np.inf
-        return int(np.argmin(rest))
+        return int(np.argmin(rest)) if usable.any() else None
 
     @staticmethod
     def _joined(

@@ -37,6 +37,8 @@ class MultiPolicy(Branching):
     values: npt.NDArray[np.uint8]
     idle: Flags
     initial: Index
+    beliefs: npt.NDArray[np.uint32]
+    """Of each state, the number of what is believed of each component of hidden facts."""
 
 
 def best_multi_policy(found: MaxProb, limits: Limits) -> tuple[MultiPolicy, LeastCost | None]:
@@ -147,6 +149,7 @@ def multi_policy(
         values=space.packing.unpack(space.states[states]),
         idle=np.zeros(len(states), dtype=np.bool_) if inside is None else ~inside[states],
         initial=number[start].astype(np.int64),
+        beliefs=space.packing.belief_numbers(space.states[states]),
     )
 
 

@@ -23,6 +23,7 @@ from bbtc.planner.mdp.maxprob import Bounds, MaxProb
 from bbtc.planner.mdp.solve import best_known, best_within
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.result import Plan, Progress
+from bbtc.planner.synthesis.believed import with_beliefs
 from bbtc.planner.synthesis.decision_tree import decision_tree
 from bbtc.planner.synthesis.permissive import (
     MultiPolicy,
@@ -63,6 +64,8 @@ class _Search:
     bounds: Bounds = field(default_factory=lambda: Bounds(Fraction(0), Fraction(1)))
     stop: Diagnostic | None = None
     interrupted: bool = False
+    wider: Task | None = None
+    """The task with what has to be asked about, too, to tell apart what is believed."""
 
     def run(self) -> None:
         """Search until done, stopped by a limit, or interrupted."""
@@ -83,9 +86,12 @@ class _Search:
         self.found = best.found
         self.bounds, self.stop, self.interrupted = best.bounds, best.stop, best.interrupted
         limits = self.limits.within(GRACE) if best.interrupted else self.limits
-        if likely_policy(best.found, LARGE_POLICY) is not None:
+        if likely_policy(best.found, LARGE_POLICY) is not None and not self.task.components:
             self._draft(one_policy(best.found), limits)
         policy = self._cheapest(best.found, limits)
+        self.wider = with_beliefs(self.task, policy)
+        if self.wider is not None:
+            return  # no tree can follow it that cannot ask
         self._keep(synthesize(self.task, policy, limits), limits)
         finish(self.best, limits, self.options)
 
@@ -104,7 +110,7 @@ class _Search:
     def _fall_back(self) -> None:
         """Write down the policy that is known, if that was not done before a limit, or the user, ended it."""
         found = self.found
-        if found is None or self._is_reached(found):
+        if found is None or self._is_reached(found) or self.wider is not None:
             return
         # The tree visits no state that was not found, but those may be a few more than the limit, and so may
         # what is worked out of an action.
@@ -157,7 +163,7 @@ def plan_policy(
     task: Task,
     target: Fraction,
     limits: Limits,
-    progress: Progress,  # noqa: ARG001
+    progress: Progress,
     options: Options = DEFAULTS,
     *,
     whole: bool = False,
@@ -171,6 +177,10 @@ def plan_policy(
         task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole, advice
     )
     search.run()
+    if search.wider is not None and not search.interrupted:
+        with suppress(LimitReached):
+            inner = replace(options, best=None)
+            return plan_policy(search.wider, target, limits, progress, inner, whole=whole, advice=advice)
     if whole and search.stop is not None:
         raise LimitReached([search.stop])
     plan = search.best.plan("interrupted" if search.interrupted else "limit-reached", search.stop)

@@ -173,6 +173,8 @@ def separating(wanted: Flags, others: Flags, own: npt.NDArray[np.float64]) -> li
     while len(outside):
         hits, misses = inside.sum(axis=0), outside.sum(axis=0)
         useful = (hits > 0) & (misses < len(outside))
+        if not useful.any():
+            break  # what is believed differs, and nothing that can be read tells it
         share = np.log2(np.maximum(hits, 1) / np.maximum(hits + misses, 1))
         gain = hits * (share - np.log2(len(inside) / (len(inside) + len(outside))))
         gain = np.where(useful, gain + own * 1e-6, -np.inf)

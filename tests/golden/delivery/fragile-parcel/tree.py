@@ -84,6 +84,13 @@ def all_of(*values: bool | None) -> bool | None:
     return None if None in values else True
 
 
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
+
+
 def negated(value: bool | None) -> bool | None:
     """Three-valued "not": unknown stays unknown."""
     return None if value is None else not value
@@ -345,12 +352,10 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition("not carrying(vase)", lambda: negated(robot.carrying("vase"))),
-                Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
-            ),
-            sequence(
-                "sequence",
-                Condition("staffed(reception)", lambda: robot.staffed("reception")),
+                Condition(
+                    "(not carrying(vase) or staffed(reception))",
+                    lambda: any_of(negated(robot.carrying("vase")), robot.staffed("reception")),
+                ),
                 Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),
         ),

@@ -305,6 +305,23 @@ def create_root(robot: Robot) -> Behaviour:
                 lambda: all_of(robot.left("vase", "reception"), robot.left("bill", "reception")),
             ),
             Latch(
+                "leave(bill,reception)",
+                lambda: robot.leave("bill", "reception"),
+                robot.cancel,
+                guard=lambda: all_of(robot.carrying("bill"), robot.at("reception")),
+                keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("not at(reception)", lambda: negated(robot.at("reception"))),
+                Latch(
+                    "go_to(reception)",
+                    lambda: robot.go_to("reception"),
+                    robot.cancel,
+                    keep=False,
+                ),
+            ),
+            Latch(
                 "leave(vase,reception)",
                 lambda: robot.leave("vase", "reception"),
                 robot.cancel,
@@ -315,28 +332,13 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("left(bill,reception)", lambda: robot.left("bill", "reception")),
-                Latch(
-                    "ring_bell(reception)",
-                    lambda: robot.ring_bell("reception"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("reception"),
-                        negated(robot.staffed("reception")),
-                    ),
-                    keep=False,
-                ),
-            ),
             Latch(
-                "leave(bill,reception)",
-                lambda: robot.leave("bill", "reception"),
+                "ring_bell(reception)",
+                lambda: robot.ring_bell("reception"),
                 robot.cancel,
-                guard=lambda: all_of(robot.carrying("bill"), robot.at("reception")),
+                guard=lambda: all_of(robot.at("reception"), negated(robot.staffed("reception"))),
                 keep=False,
             ),
-            Latch("go_to(reception)", lambda: robot.go_to("reception"), robot.cancel, keep=False),
         ),
         READS,
     )

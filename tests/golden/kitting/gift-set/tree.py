@@ -81,6 +81,13 @@ def all_of(*values: bool | None) -> bool | None:
     return None if None in values else True
 
 
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
+
+
 def negated(value: bool | None) -> bool | None:
     """Three-valued "not": unknown stays unknown."""
     return None if value is None else not value
@@ -313,12 +320,114 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.packed("chocolates", "crate1"),
                 ),
             ),
-            Latch(
-                "read_force_sensor(chocolates)",
-                lambda: robot.read_force_sensor("chocolates"),
-                robot.cancel,
-                guard=lambda: robot.holding("chocolates") is None,
-                keep=False,
+            sequence(
+                "sequence",
+                Condition(
+                    "((unknown holding(chocolates) or holding(chocolates) or not…",
+                    lambda: all_of(
+                        any_of(
+                            robot.holding("chocolates") is None,
+                            robot.holding("chocolates"),
+                            negated(robot.lost("chocolates")),
+                            robot.packed("chocolates", "crate1"),
+                        ),
+                        any_of(
+                            robot.holding("wine") is None,
+                            robot.holding("wine"),
+                            negated(robot.lost("wine")),
+                            robot.packed("wine", "crate1"),
+                        ),
+                    ),
+                ),
+                fallback(
+                    "fallback",
+                    Latch(
+                        "read_force_sensor(chocolates)",
+                        lambda: robot.read_force_sensor("chocolates"),
+                        robot.cancel,
+                        guard=lambda: robot.holding("chocolates") is None,
+                        keep=False,
+                    ),
+                    Latch(
+                        "place(chocolates,crate1)",
+                        lambda: robot.place("chocolates", "crate1"),
+                        robot.cancel,
+                        guard=lambda: robot.holding("chocolates"),
+                        keep=False,
+                    ),
+                    Latch(
+                        "read_force_sensor(wine)",
+                        lambda: robot.read_force_sensor("wine"),
+                        robot.cancel,
+                        guard=lambda: robot.holding("wine") is None,
+                        keep=False,
+                    ),
+                    Latch(
+                        "place(wine,crate1)",
+                        lambda: robot.place("wine", "crate1"),
+                        robot.cancel,
+                        guard=lambda: robot.holding("wine"),
+                        keep=False,
+                    ),
+                    sequence(
+                        "sequence",
+                        Condition(
+                            "not packed(chocolates,crate1)",
+                            lambda: negated(robot.packed("chocolates", "crate1")),
+                        ),
+                        Latch(
+                            "pick(chocolates)",
+                            lambda: robot.pick("chocolates"),
+                            robot.cancel,
+                            guard=lambda: all_of(
+                                robot.gripper_free(),
+                                robot.in_view("chocolates"),
+                                negated(robot.holding("chocolates")),
+                                negated(robot.lost("chocolates")),
+                            ),
+                            keep=False,
+                        ),
+                    ),
+                    Latch(
+                        "look_for(wine)",
+                        lambda: robot.look_for("wine"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            negated(robot.in_view("wine")),
+                            negated(robot.lost("wine")),
+                        ),
+                        keep=False,
+                    ),
+                    sequence(
+                        "sequence",
+                        Condition(
+                            "not packed(wine,crate1)",
+                            lambda: negated(robot.packed("wine", "crate1")),
+                        ),
+                        Latch(
+                            "pick(wine)",
+                            lambda: robot.pick("wine"),
+                            robot.cancel,
+                            guard=lambda: all_of(
+                                robot.gripper_free(),
+                                robot.in_view("wine"),
+                                negated(robot.holding("wine")),
+                                negated(robot.lost("wine")),
+                            ),
+                            keep=False,
+                        ),
+                    ),
+                    Latch(
+                        "look_for(chocolates)",
+                        lambda: robot.look_for("chocolates"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            negated(robot.in_view("chocolates")),
+                            negated(robot.lost("chocolates")),
+                        ),
+                        keep=False,
+                    ),
+                ),
             ),
             Latch(
                 "place(chocolates,crate1)",
@@ -328,91 +437,28 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "read_force_sensor(wine)",
-                lambda: robot.read_force_sensor("wine"),
-                robot.cancel,
-                guard=lambda: robot.holding("wine") is None,
-                keep=False,
-            ),
-            Latch(
                 "place(wine,crate1)",
                 lambda: robot.place("wine", "crate1"),
                 robot.cancel,
                 guard=lambda: robot.holding("wine"),
                 keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
-                Latch(
-                    "look_for(chocolates)",
-                    lambda: robot.look_for("chocolates"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.in_view("chocolates")),
-                        negated(robot.lost("chocolates")),
-                    ),
-                    keep=False,
-                ),
+            Latch(
+                "look_for(wine)",
+                lambda: robot.look_for("wine"),
+                robot.cancel,
+                guard=lambda: all_of(negated(robot.in_view("wine")), negated(robot.lost("wine"))),
+                keep=False,
             ),
             sequence(
                 "sequence",
                 Condition(
-                    "packed(chocolates,crate1)",
-                    lambda: robot.packed("chocolates", "crate1"),
-                ),
-                Latch(
-                    "look_for(wine)",
-                    lambda: robot.look_for("wine"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.in_view("wine")),
-                        negated(robot.lost("wine")),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "(not packed(chocolates,crate1) and not lost(wine))",
-                    lambda: all_of(
-                        negated(robot.packed("chocolates", "crate1")),
-                        negated(robot.lost("wine")),
+                    "(not gripper_free() or packed(chocolates,crate1))",
+                    lambda: any_of(
+                        negated(robot.gripper_free()),
+                        robot.packed("chocolates", "crate1"),
                     ),
                 ),
-                Latch(
-                    "pick(chocolates)",
-                    lambda: robot.pick("chocolates"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.gripper_free(),
-                        robot.in_view("chocolates"),
-                        negated(robot.holding("chocolates")),
-                        negated(robot.lost("chocolates")),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("not lost(chocolates)", lambda: negated(robot.lost("chocolates"))),
-                Latch(
-                    "pick(wine)",
-                    lambda: robot.pick("wine"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.gripper_free(),
-                        robot.in_view("wine"),
-                        negated(robot.holding("wine")),
-                        negated(robot.lost("wine")),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("not lost(wine)", lambda: negated(robot.lost("wine"))),
                 Latch(
                     "look_for(chocolates)",
                     lambda: robot.look_for("chocolates"),
@@ -439,83 +485,6 @@ def create_root(robot: Robot) -> Behaviour:
                         robot.in_view("chocolates"),
                         negated(robot.holding("chocolates")),
                         negated(robot.lost("chocolates")),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "packed(chocolates,crate1)",
-                    lambda: robot.packed("chocolates", "crate1"),
-                ),
-                Latch(
-                    "pick(wine)",
-                    lambda: robot.pick("wine"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.gripper_free(),
-                        robot.in_view("wine"),
-                        negated(robot.holding("wine")),
-                        negated(robot.lost("wine")),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("not gripper_free()", lambda: negated(robot.gripper_free())),
-                fallback(
-                    "fallback",
-                    Latch(
-                        "look_for(wine)",
-                        lambda: robot.look_for("wine"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            negated(robot.in_view("wine")),
-                            negated(robot.lost("wine")),
-                        ),
-                        keep=False,
-                    ),
-                    Latch(
-                        "look_for(chocolates)",
-                        lambda: robot.look_for("chocolates"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            negated(robot.in_view("chocolates")),
-                            negated(robot.lost("chocolates")),
-                        ),
-                        keep=False,
-                    ),
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "packed(chocolates,crate1)",
-                    lambda: robot.packed("chocolates", "crate1"),
-                ),
-                Latch(
-                    "look_for(chocolates)",
-                    lambda: robot.look_for("chocolates"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.in_view("chocolates")),
-                        negated(robot.lost("chocolates")),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
-                Latch(
-                    "look_for(wine)",
-                    lambda: robot.look_for("wine"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.in_view("wine")),
-                        negated(robot.lost("wine")),
                     ),
                     keep=False,
                 ),

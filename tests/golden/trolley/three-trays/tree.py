@@ -378,20 +378,6 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "strap(tray1)",
-                lambda: robot.strap("tray1"),
-                robot.cancel,
-                guard=lambda: robot.on("tray1"),
-                keep=False,
-            ),
-            Latch(
-                "strap(tray2)",
-                lambda: robot.strap("tray2"),
-                robot.cancel,
-                guard=lambda: robot.on("tray2"),
-                keep=False,
-            ),
-            Latch(
                 "push(kitchen)",
                 lambda: robot.push("kitchen"),
                 robot.cancel,

@@ -317,6 +317,13 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: robot.spilled("tray2"),
                 keep=False,
             ),
+            Latch(
+                "push(kitchen)",
+                lambda: robot.push("kitchen"),
+                robot.cancel,
+                guard=lambda: negated(robot.trolley_at("kitchen")),
+                keep=False,
+            ),
         ),
         READS,
     )
@@ -428,6 +435,7 @@ READS: dict[Fact, bool] = {
     ("on", "tray1"): False,
     ("on", "tray2"): False,
     ("spilled", "tray2"): False,
+    ("trolley_at", "kitchen"): False,
     ("trolley_at", "ward"): False,
 }
 """The facts that the tree reads, and whether they can be unknown."""
@@ -450,6 +458,27 @@ INITIAL: list[tuple[str, State]] = [
 
 
 ACTIONS: dict[Fact, list[Factor]] = {
+    ("push", "kitchen"): [
+        [
+            Outcome(
+                "1/40",
+                {("trolley_at", "kitchen"): True, ("trolley_at", "ward"): False},
+                When(
+                    lambda s: all_of(s[("on", "tray2")], negated(s[("strapped", "tray2")])),
+                    {("on", "tray2"): False, ("spilled", "tray2"): True},
+                ),
+            ),
+            Outcome(
+                "3/40",
+                {("trolley_at", "kitchen"): True, ("trolley_at", "ward"): False},
+                When(
+                    lambda s: all_of(s[("on", "tray2")], negated(s[("strapped", "tray2")])),
+                    {("on", "tray2"): False},
+                ),
+            ),
+            Outcome("9/10", {("trolley_at", "kitchen"): True, ("trolley_at", "ward"): False}),
+        ],
+    ],
     ("push", "ward"): [
         [
             Outcome(

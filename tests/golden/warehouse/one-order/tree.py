@@ -314,43 +314,116 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("delivered(drill)", lambda: robot.delivered("drill")),
-            Latch(
-                "hand_in(drill,packing)",
-                lambda: robot.hand_in("drill", "packing"),
-                robot.cancel,
-                guard=lambda: all_of(robot.loaded("drill"), robot.at("packing")),
-                keep=False,
-            ),
-            Latch(
-                "scan(drill,a1)",
-                lambda: robot.scan("drill", "a1"),
-                robot.cancel,
-                guard=lambda: all_of(robot.at("a1"), robot.stored("drill", "a1") is None),
-                keep=False,
-            ),
-            Latch(
-                "fetch(drill,a1)",
-                lambda: robot.fetch("drill", "a1"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.at("a1"),
-                    robot.stored("drill", "a1"),
-                    negated(robot.loaded("drill")),
-                ),
-                keep=False,
-            ),
             sequence(
                 "sequence",
-                Condition("loaded(drill)", lambda: robot.loaded("drill")),
-                Latch(
-                    "drive(packing)",
-                    lambda: robot.drive("packing"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.at("packing")),
-                        any_of(
-                            robot.at("packing"),
-                            all_of(
+                Condition(
+                    "(loaded(drill) or unknown stored(drill,a1) or stored(drill,…",
+                    lambda: any_of(
+                        robot.loaded("drill"),
+                        robot.stored("drill", "a1") is None,
+                        robot.stored("drill", "a1"),
+                        robot.stored("drill", "a2") is None,
+                        robot.stored("drill", "a2"),
+                    ),
+                ),
+                fallback(
+                    "fallback",
+                    Latch(
+                        "hand_in(drill,packing)",
+                        lambda: robot.hand_in("drill", "packing"),
+                        robot.cancel,
+                        guard=lambda: all_of(robot.loaded("drill"), robot.at("packing")),
+                        keep=False,
+                    ),
+                    Latch(
+                        "scan(drill,a1)",
+                        lambda: robot.scan("drill", "a1"),
+                        robot.cancel,
+                        guard=lambda: all_of(robot.at("a1"), robot.stored("drill", "a1") is None),
+                        keep=False,
+                    ),
+                    Latch(
+                        "fetch(drill,a1)",
+                        lambda: robot.fetch("drill", "a1"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            robot.at("a1"),
+                            robot.stored("drill", "a1"),
+                            negated(robot.loaded("drill")),
+                        ),
+                        keep=False,
+                    ),
+                    sequence(
+                        "sequence",
+                        Condition("loaded(drill)", lambda: robot.loaded("drill")),
+                        Latch(
+                            "drive(packing)",
+                            lambda: robot.drive("packing"),
+                            robot.cancel,
+                            guard=lambda: all_of(
+                                negated(robot.at("packing")),
+                                any_of(
+                                    robot.at("packing"),
+                                    all_of(
+                                        any_of(
+                                            robot.at("a1"),
+                                            all_of(
+                                                robot.at("packing"),
+                                                negated(robot.blocked("packing", "a1")),
+                                                negated(robot.blocked("a1", "packing")),
+                                            ),
+                                            all_of(
+                                                robot.at("a2"),
+                                                negated(robot.blocked("a2", "a1")),
+                                                negated(robot.blocked("a1", "a2")),
+                                            ),
+                                        ),
+                                        negated(robot.blocked("a1", "packing")),
+                                        negated(robot.blocked("packing", "a1")),
+                                    ),
+                                ),
+                            ),
+                            keep=False,
+                        ),
+                    ),
+                    Latch(
+                        "drive(a2)",
+                        lambda: robot.drive("a2"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            negated(robot.at("a2")),
+                            any_of(
+                                robot.at("a2"),
+                                all_of(
+                                    any_of(
+                                        robot.at("a1"),
+                                        all_of(
+                                            robot.at("packing"),
+                                            negated(robot.blocked("packing", "a1")),
+                                            negated(robot.blocked("a1", "packing")),
+                                        ),
+                                        all_of(
+                                            robot.at("a2"),
+                                            negated(robot.blocked("a2", "a1")),
+                                            negated(robot.blocked("a1", "a2")),
+                                        ),
+                                    ),
+                                    negated(robot.blocked("a1", "a2")),
+                                    negated(robot.blocked("a2", "a1")),
+                                ),
+                            ),
+                        ),
+                        keep=False,
+                    ),
+                    sequence(
+                        "sequence",
+                        Condition("at(packing)", lambda: robot.at("packing")),
+                        Latch(
+                            "drive(a1)",
+                            lambda: robot.drive("a1"),
+                            robot.cancel,
+                            guard=lambda: all_of(
+                                negated(robot.at("a1")),
                                 any_of(
                                     robot.at("a1"),
                                     all_of(
@@ -364,67 +437,34 @@ def create_root(robot: Robot) -> Behaviour:
                                         negated(robot.blocked("a1", "a2")),
                                     ),
                                 ),
-                                negated(robot.blocked("a1", "packing")),
-                                negated(robot.blocked("packing", "a1")),
                             ),
+                            keep=False,
                         ),
                     ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(packing)", lambda: robot.at("packing")),
-                Latch(
-                    "drive(a1)",
-                    lambda: robot.drive("a1"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.at("a1")),
-                        any_of(
-                            robot.at("a1"),
-                            all_of(
-                                robot.at("packing"),
-                                negated(robot.blocked("packing", "a1")),
-                                negated(robot.blocked("a1", "packing")),
-                            ),
-                            all_of(
-                                robot.at("a2"),
-                                negated(robot.blocked("a2", "a1")),
-                                negated(robot.blocked("a1", "a2")),
-                            ),
-                        ),
+                    Latch(
+                        "scan(drill,a2)",
+                        lambda: robot.scan("drill", "a2"),
+                        robot.cancel,
+                        guard=lambda: all_of(robot.at("a2"), robot.stored("drill", "a2") is None),
+                        keep=False,
                     ),
-                    keep=False,
-                ),
-            ),
-            Latch(
-                "scan(drill,a2)",
-                lambda: robot.scan("drill", "a2"),
-                robot.cancel,
-                guard=lambda: all_of(robot.at("a2"), robot.stored("drill", "a2") is None),
-                keep=False,
-            ),
-            Latch(
-                "fetch(drill,a2)",
-                lambda: robot.fetch("drill", "a2"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.at("a2"),
-                    robot.stored("drill", "a2"),
-                    negated(robot.loaded("drill")),
-                ),
-                keep=False,
-            ),
-            Latch(
-                "drive(a2)",
-                lambda: robot.drive("a2"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    negated(robot.at("a2")),
-                    any_of(
-                        robot.at("a2"),
-                        all_of(
+                    Latch(
+                        "fetch(drill,a2)",
+                        lambda: robot.fetch("drill", "a2"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            robot.at("a2"),
+                            robot.stored("drill", "a2"),
+                            negated(robot.loaded("drill")),
+                        ),
+                        keep=False,
+                    ),
+                    Latch(
+                        "drive(a1)",
+                        lambda: robot.drive("a1"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            negated(robot.at("a1")),
                             any_of(
                                 robot.at("a1"),
                                 all_of(
@@ -438,8 +478,28 @@ def create_root(robot: Robot) -> Behaviour:
                                     negated(robot.blocked("a1", "a2")),
                                 ),
                             ),
-                            negated(robot.blocked("a1", "a2")),
+                        ),
+                        keep=False,
+                    ),
+                ),
+            ),
+            Latch(
+                "drive(a1)",
+                lambda: robot.drive("a1"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    negated(robot.at("a1")),
+                    any_of(
+                        robot.at("a1"),
+                        all_of(
+                            robot.at("packing"),
+                            negated(robot.blocked("packing", "a1")),
+                            negated(robot.blocked("a1", "packing")),
+                        ),
+                        all_of(
+                            robot.at("a2"),
                             negated(robot.blocked("a2", "a1")),
+                            negated(robot.blocked("a1", "a2")),
                         ),
                     ),
                 ),
@@ -448,64 +508,9 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "sequence",
                 Condition(
-                    "(known stored(drill,a1) and stored(drill,a1))",
-                    lambda: all_of(
-                        robot.stored("drill", "a1") is not None,
-                        robot.stored("drill", "a1"),
-                    ),
+                    "(blocked(a1,a2) or blocked(a2,a1))",
+                    lambda: any_of(robot.blocked("a1", "a2"), robot.blocked("a2", "a1")),
                 ),
-                Latch(
-                    "drive(a1)",
-                    lambda: robot.drive("a1"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.at("a1")),
-                        any_of(
-                            robot.at("a1"),
-                            all_of(
-                                robot.at("packing"),
-                                negated(robot.blocked("packing", "a1")),
-                                negated(robot.blocked("a1", "packing")),
-                            ),
-                            all_of(
-                                robot.at("a2"),
-                                negated(robot.blocked("a2", "a1")),
-                                negated(robot.blocked("a1", "a2")),
-                            ),
-                        ),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("unknown stored(drill,a1)", lambda: robot.stored("drill", "a1") is None),
-                Latch(
-                    "drive(a1)",
-                    lambda: robot.drive("a1"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.at("a1")),
-                        any_of(
-                            robot.at("a1"),
-                            all_of(
-                                robot.at("packing"),
-                                negated(robot.blocked("packing", "a1")),
-                                negated(robot.blocked("a1", "packing")),
-                            ),
-                            all_of(
-                                robot.at("a2"),
-                                negated(robot.blocked("a2", "a1")),
-                                negated(robot.blocked("a1", "a2")),
-                            ),
-                        ),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition("at(a1)", lambda: robot.at("a1")),
                 Latch(
                     "drive(packing)",
                     lambda: robot.drive("packing"),
@@ -538,50 +543,34 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "sequence",
-                Condition("blocked(a1,packing)", lambda: robot.blocked("a1", "packing")),
-                Latch(
-                    "drive(a1)",
-                    lambda: robot.drive("a1"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        negated(robot.at("a1")),
-                        any_of(
-                            robot.at("a1"),
-                            all_of(
-                                robot.at("packing"),
-                                negated(robot.blocked("packing", "a1")),
-                                negated(robot.blocked("a1", "packing")),
-                            ),
-                            all_of(
-                                robot.at("a2"),
-                                negated(robot.blocked("a2", "a1")),
-                                negated(robot.blocked("a1", "a2")),
-                            ),
-                        ),
-                    ),
-                    keep=False,
+                Condition(
+                    "(blocked(a1,packing) or blocked(packing,a1))",
+                    lambda: any_of(robot.blocked("a1", "packing"), robot.blocked("packing", "a1")),
                 ),
-            ),
-            sequence(
-                "sequence",
-                Condition("blocked(packing,a1)", lambda: robot.blocked("packing", "a1")),
                 Latch(
-                    "drive(a1)",
-                    lambda: robot.drive("a1"),
+                    "drive(a2)",
+                    lambda: robot.drive("a2"),
                     robot.cancel,
                     guard=lambda: all_of(
-                        negated(robot.at("a1")),
+                        negated(robot.at("a2")),
                         any_of(
-                            robot.at("a1"),
+                            robot.at("a2"),
                             all_of(
-                                robot.at("packing"),
-                                negated(robot.blocked("packing", "a1")),
-                                negated(robot.blocked("a1", "packing")),
-                            ),
-                            all_of(
-                                robot.at("a2"),
-                                negated(robot.blocked("a2", "a1")),
+                                any_of(
+                                    robot.at("a1"),
+                                    all_of(
+                                        robot.at("packing"),
+                                        negated(robot.blocked("packing", "a1")),
+                                        negated(robot.blocked("a1", "packing")),
+                                    ),
+                                    all_of(
+                                        robot.at("a2"),
+                                        negated(robot.blocked("a2", "a1")),
+                                        negated(robot.blocked("a1", "a2")),
+                                    ),
+                                ),
                                 negated(robot.blocked("a1", "a2")),
+                                negated(robot.blocked("a2", "a1")),
                             ),
                         ),
                     ),

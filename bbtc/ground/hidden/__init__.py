@@ -1,0 +1,1 @@
+"""From tasks with hidden facts to tasks whose conditions read knowledge only."""

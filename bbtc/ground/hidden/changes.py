@@ -1,0 +1,190 @@
+"""What an action does, taken apart: to what is seen, and to each component of hidden facts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
+
+from bbtc.ground import task as gt
+from bbtc.ground.condition import Condition, Is, Known, replaced, variables
+from bbtc.ground.effects import arrange
+from bbtc.ground.hidden.groups import Groups
+from bbtc.ground.hidden.parts import (
+    Parts,
+    Setting,
+    all_settings,
+    drawn_anew,
+    effects_of,
+    facts_of,
+    facts_read,
+    is_test,
+    only,
+    parts_of,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """An action with its effects on what matters, in parts, and what it tells."""
+
+    action: gt.GroundAction
+    parts: Parts
+    readings: tuple[gt.Observation, ...]
+
+
+def act(
+    action: gt.GroundAction, readings: Iterable[gt.Observation], kept: Set[int], hidden: frozenset[int]
+) -> Act:
+    """An action, as far as it matters: ``kept`` variables, of which some are ``hidden``."""
+    parts = parts_of(action.factors)
+    draws = [only(draw, kept) for draw in parts.draws]
+    parts = replace(
+        parts,
+        settings=[setting for setting in parts.settings if setting.variable in kept],
+        draws=[draw for draw in draws if draw is not None],
+    )
+    told = tuple(reading for reading in readings if not hidden.isdisjoint(variables(reading.condition)))
+    return Act(action, drawn_anew(parts), told)
+
+
+def join(groups: Groups, acts: Iterable[Act]) -> None:
+    """Join the hidden facts that actions make depend on each other."""
+    for each in acts:
+        for setting in each.parts.settings:
+            if setting.variable in groups:
+                groups.join(_hidden(groups, facts_read(setting.when) | {setting.variable}))
+        for charge in each.parts.charges:
+            groups.join(_hidden(groups, facts_read(charge.when)))
+        for draw in each.parts.draws:
+            groups.join(_hidden(groups, facts_of(draw)))
+        for reading in each.readings:
+            groups.join(_hidden(groups, _read_after([reading])))
+        for draw in each.parts.draws:
+            seen = {setting.variable for setting in all_settings([draw])}
+            touched = facts_of(draw) & seen
+            for reading in each.readings:
+                if _read_after([reading]) & seen:
+                    touched |= _read_after([reading])
+            groups.join(_hidden(groups, touched))
+
+
+def _hidden(groups: Groups, facts: Iterable[int]) -> list[int]:
+    return [fact for fact in facts if fact in groups]
+
+
+def _read_after(readings: Iterable[gt.Observation]) -> set[int]:
+    """The variables that readings read, after the action."""
+    return {
+        variable
+        for reading in readings
+        for condition in (reading.condition, reading.when)
+        if condition is not None
+        for variable in variables(condition)
+    }
+
+
+# --- a component of an action --------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class _Share:
+    """What an action does to one component."""
+
+    settings: list[Setting] = field(default_factory=list)
+    charges: list[gt.Charge] = field(default_factory=list)
+    draws: list[gt.Factor] = field(default_factory=list)
+    readings: list[gt.Observation] = field(default_factory=list)
+
+
+def divided(
+    each: Act, groups: Groups, components: Mapping[int, tuple[int, Sequence[int]]]
+) -> tuple[tuple[gt.Factor, ...], tuple[gt.Change, ...]]:
+    """The factors of what is seen, and the changes of components, which are given by the fact that stands
+    for each, with their numbers and facts."""
+    shares: dict[int, _Share] = {}
+
+    def share(facts: Iterable[int]) -> _Share | None:
+        hidden = _hidden(groups, facts)
+        return shares.setdefault(groups.of(hidden[0]), _Share()) if hidden else None
+
+    parts, seen = each.parts, _Share()
+    for reading in each.readings:
+        of = share(_read_after([reading]))
+        assert of is not None
+        of.readings.append(reading)
+    for charge in parts.charges:
+        (share(facts_read(charge.when)) or seen).charges.append(charge)
+    after = {leader: _read_after(of.readings) for leader, of in shares.items()}
+
+    def readers(sets: set[int]) -> list[_Share]:
+        return [shares[leader] for leader, read in after.items() if read & sets]
+
+    for draw in parts.draws:
+        of = share(facts_of(draw))
+        sets = {setting.variable for setting in all_settings([draw])}
+        (of or next(iter(readers(sets)), seen)).draws.append(draw)
+    for setting in parts.settings:
+        of = share([setting.variable])
+        for into in [of] if of is not None else readers({setting.variable}) or [seen]:
+            into.settings.append(setting)
+    outcome = gt.Outcome(gt.ONE, effects_of(seen.settings), (), parts.reward, parts.cost, tuple(seen.charges))
+    factors = arrange([gt.Factor((outcome,)), *seen.draws]) or (gt.NO_CHANGE,)
+    changes = [_change(*components[leader], of) for leader, of in sorted(shares.items())]
+    return factors, tuple(sorted(changes, key=lambda change: change.component))
+
+
+def _change(component: int, facts: Sequence[int], share: _Share) -> gt.Change:
+    local = Local(facts)
+    factors = []
+    if share.settings or share.charges:
+        certain = gt.Outcome(gt.ONE, effects_of(share.settings), charges=tuple(share.charges))
+        factors.append(local.factor(gt.Factor((certain,))))
+    factors += [local.factor(draw) for draw in share.draws]
+    readings = tuple(local.observation(reading) for reading in share.readings)
+    return gt.Change(component, tuple(local.seen), tuple(factors), readings)
+
+
+class Local:
+    """The local variables of a component: its facts, then the task's variables that are asked for."""
+
+    def __init__(self, facts: Sequence[int]) -> None:
+        self._facts = {fact: place for place, fact in enumerate(facts)}
+        self.seen: list[int] = []
+        self._seen: dict[int, int] = {}
+
+    def variable(self, number: int, *, test: bool = False) -> int:
+        """The local number of a variable; with ``test``, of what is known of it."""
+        if number in self._facts and not test:
+            return self._facts[number]
+        if number not in self._seen:
+            self._seen[number] = len(self._facts) + len(self.seen)
+            self.seen.append(number)
+        return self._seen[number]
+
+    def condition(self, condition: Condition) -> Condition:
+        """A condition over local variables."""
+        return replaced(condition, self._leaf)
+
+    def _leaf(self, leaf: Is | Known) -> Condition:
+        return replace(leaf, variable=self.variable(leaf.variable, test=is_test(leaf)))
+
+    def factor(self, factor: gt.Factor) -> gt.Factor:
+        """A factor over local variables."""
+        return replace(factor, outcomes=tuple(map(self._outcome, factor.outcomes)))
+
+    def _outcome(self, outcome: gt.Outcome) -> gt.Outcome:
+        effects = tuple(
+            gt.Effect(
+                None if effect.when is None else self.condition(effect.when),
+                tuple((self.variable(number), value) for number, value in effect.sets),
+            )
+            for effect in outcome.effects
+        )
+        charges = tuple(replace(each, when=self.condition(each.when)) for each in outcome.charges)
+        inner = tuple(map(self.factor, outcome.factors))
+        return replace(outcome, effects=effects, factors=inner, charges=charges)
+
+    def observation(self, reading: gt.Observation) -> gt.Observation:
+        """An observation over local variables."""
+        when = None if reading.when is None else self.condition(reading.when)
+        return replace(reading, condition=self.condition(reading.condition), when=when)

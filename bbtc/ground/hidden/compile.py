@@ -1,0 +1,262 @@
+"""The belief compilation: from a physical task to one whose conditions read knowledge only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from bbtc.collector import collector_paused
+from bbtc.diagnostics import BbtcError, Report
+from bbtc.ground import task as gt
+from bbtc.ground.condition import Condition, Is, compile_condition, variables
+from bbtc.ground.hidden.changes import Local, act, divided, join
+from bbtc.ground.hidden.groups import Groups
+from bbtc.ground.hidden.knowledge import KnownConditions, TooManyCases
+from bbtc.ground.hidden.naming import formula_names
+from bbtc.ground.hidden.parts import Setting, all_settings, effects_of, settings_of
+from bbtc.ground.hidden.physical import Physical, physical
+from bbtc.ground.hidden.relevance import relevant
+from bbtc.ground.hidden.uncertain import hidden_facts
+from bbtc.ground.hidden.worlds import TooManyWorlds, Worlds, given_true
+from bbtc.ground.prune import reordered
+from bbtc.ground.start import MOST_WORLDS, contradicted
+from bbtc.kleene import Truth
+from bbtc.limits import Limits
+from bbtc.model import domain as md
+from bbtc.source import Span
+
+_MOST_NAMED = 4
+
+
+def hidden_task(model: md.Model, report: Report, limits: Limits) -> gt.Task:
+    """The task of a model with hidden state. Raises as :func:`bbtc.ground.instantiate.ground` does."""
+    with collector_paused():
+        found = physical(model, report, limits)
+        return _Compiler(model, found, report, limits).task()
+
+
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """What the final task reads of what is known."""
+
+    goal: Condition
+    preconditions: list[Condition]
+    knowledge: KnownConditions
+
+
+class _Compiler:
+    def __init__(self, model: md.Model, found: Physical, report: Report, limits: Limits) -> None:
+        self._model = model
+        self._found = found
+        self._report = report
+        self._limits = limits
+        hidden = hidden_facts(found)
+        kept, names = relevant(found, hidden)
+        self._hidden = hidden & kept
+        self._kept = kept
+        self._acts = [
+            act(action, found.readings.get(action.name, ()), kept, self._hidden)
+            for action in found.task.actions
+            if action.name in names
+        ]
+        self._groups = Groups(self._hidden)
+        self._draws = [draw for draw in found.draws if self._hidden.issuperset(draw.variables)]
+        clauses = (
+            (given_true(clause.condition, found.start, found.uncertain), clause.span)
+            for clause in found.clauses
+        )
+        self._clauses = [
+            (condition, span) for condition, span in clauses if self._hidden.issuperset(variables(condition))
+        ]
+        for draw in self._draws:
+            self._groups.join(draw.variables)
+        for condition, _ in self._clauses:
+            self._groups.join(variables(condition))
+        join(self._groups, self._acts)
+
+    def task(self) -> gt.Task:
+        """The task whose conditions read knowledge."""
+        read = self._read()
+        facts = {self._groups.of(each[0]): each for each in self._groups.all()}
+        numbers = {leader: (number, each) for number, (leader, each) in enumerate(facts.items())}
+        actions = []
+        for each, precondition in zip(self._acts, read.preconditions, strict=True):
+            factors, changes = divided(each, self._groups, numbers)
+            actions.append(replace(each.action, precondition=precondition, factors=factors, changes=changes))
+        templates = tuple(self._template(template, read.knowledge) for template in self._found.task.templates)
+        made = replace(
+            self._found.task,
+            variables=self._variables(read.knowledge),
+            goal=read.goal,
+            actions=tuple(actions),
+            templates=templates,
+        )
+        asked = set(_asked(made))
+        components = [self._component(each, read.knowledge, asked) for each in facts.values()]
+        self._report.raise_errors()
+        values = [*self._found.start, *[Truth.UNKNOWN] * len(read.knowledge.formulas)]
+        for component in components:
+            for variable, value in _known_at_first(component):
+                values[variable] = value
+        made = replace(
+            made,
+            components=tuple(components),
+            initial=(gt.InitialState(Fraction(1), tuple(values)),),
+        )
+        last = len(self._found.task.variables)
+        order = [
+            number
+            for number in range(len(made.variables))
+            if (number in asked if number in self._hidden or number >= last else number in self._kept)
+        ]
+        return reordered(made, sorted(order, key=lambda number: made.variables[number].name))
+
+    # --- conditions --------------------------------------------------------------------------
+
+    def _read(self) -> _Read:
+        """All conditions on what is known, once the components they need are joined."""
+        task = self._found.task
+        while True:
+            self._limits.check_time("grounding")
+            knowledge = KnownConditions(self._groups, len(task.variables))
+            goal = self._known(knowledge, task.goal, task.goal_span)
+            preconditions = [
+                self._known(knowledge, each.action.precondition, each.action.span) for each in self._acts
+            ]
+            for template in task.templates:
+                self._template(template, knowledge)
+            if not knowledge.joined:
+                return _Read(goal, preconditions, knowledge)
+
+    def _known(
+        self, knowledge: KnownConditions, condition: Condition, span: Span | None, *, truth: bool = True
+    ) -> Condition:
+        try:
+            return knowledge.known(condition, truth=truth)
+        except TooManyCases:
+            raise BbtcError.single(
+                "BBT0416",
+                "this condition mixes too many visible facts with hidden ones",
+                span,
+                "say what is hidden in a condition of its own, as a derived predicate",
+            ) from None
+
+    def _template(self, template: gt.GroundTemplate, knowledge: KnownConditions) -> gt.GroundTemplate:
+        """A template whose conditions read knowledge; what its guide makes true becomes known."""
+
+        def body(part: gt.Body) -> gt.Body:
+            if isinstance(part, gt.BodyControl):
+                return replace(part, children=tuple(map(body, part.children)))
+            if isinstance(part, gt.BodyCondition):
+                return replace(
+                    part, condition=self._known(knowledge, part.condition, template.span, truth=False)
+                )
+            return part
+
+        def outcome(each: gt.Outcome) -> gt.Outcome:
+            settings = [
+                Setting(None if s.when is None else self._known(knowledge, s.when, template.span), *s[1:])
+                for s in settings_of(each)
+            ]
+            inner = tuple(map(factor, each.factors))
+            return replace(each, effects=effects_of(settings), factors=inner)
+
+        def factor(each: gt.Factor) -> gt.Factor:
+            return replace(each, outcomes=tuple(map(outcome, each.outcomes)))
+
+        return replace(
+            template,
+            precondition=self._known(knowledge, template.precondition, template.span),
+            factors=tuple(map(factor, template.factors)),
+            body=body(template.body),
+        )
+
+    # --- variables and components ------------------------------------------------------------
+
+    def _variables(self, knowledge: KnownConditions) -> tuple[gt.Variable, ...]:
+        declared = self._model.predicates
+        made = [
+            replace(
+                variable,
+                three_valued=number in self._hidden or declared[variable.predicate].declared_three_valued,
+                hidden=number in self._hidden,
+            )
+            for number, variable in enumerate(self._found.task.variables)
+        ]
+        names = formula_names(made, list(knowledge.formulas))
+        return (*made, *(gt.Variable(name, (), three_valued=True, hidden=True) for name in names))
+
+    def _component(self, facts: Sequence[int], knowledge: KnownConditions, asked: set[int]) -> gt.Component:
+        self._limits.check_time("listing worlds")
+        mine, start = set(facts), self._found.start
+        draws = [draw for draw in self._draws if mine.issuperset(draw.variables) and draw.variables]
+        clauses = [
+            (condition, span)
+            for condition, span in self._clauses
+            if mine.intersection(variables(condition)) or (not any(True for _ in variables(condition)))
+        ]
+        given = {fact: start[fact] is Truth.TRUE for fact in facts if fact not in self._found.uncertain}
+        names = [self._found.task.variables[fact].name for fact in facts]
+        try:
+            prior = Worlds(facts, given, draws, [each for each, _ in clauses], self._limits).all()
+        except TooManyWorlds:
+            listed = ", ".join(f"`{name}`" for name in names[:_MOST_NAMED])
+            more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+            self._report.error(
+                "BBT0415",
+                f"the hidden facts {listed}{more} depend on each other and have more than "
+                f"{MOST_WORLDS:,} worlds",
+                self._model.init.span or self._model.problem_span,
+                "facts that no draw, condition, effect or observation joins are tracked apart",
+            )
+            prior = {0: Fraction(1)}
+        if not prior:
+            spans = [span for _, span in clauses if span is not None]
+            contradicted(self._report, spans[0] if spans else self._model.init.span)
+            prior = {0: Fraction(1)}
+        local = Local(facts)
+        known = [gt.Knowledge(fact, local.condition(Is(fact, Truth.TRUE))) for fact in facts if fact in asked]
+        known += [
+            gt.Knowledge(number, local.condition(formula))
+            for formula, number in knowledge.formulas.items()
+            if mine.issuperset(variables(formula)) and number in asked
+        ]
+        return gt.Component(tuple(names), tuple(prior.items()), tuple(known))
+
+
+def _known_at_first(component: gt.Component) -> Iterator[tuple[int, Truth]]:
+    """What the prior tells."""
+    worlds = [
+        bytes(2 * (world >> place & 1) for place in range(len(component.facts)))
+        for world, _ in component.prior
+    ]
+    for each in component.known:
+        value = compile_condition(each.condition)
+        found = {value(world) for world in worlds}
+        yield each.variable, Truth(found.pop()) if len(found) == 1 else Truth.UNKNOWN
+
+
+def _asked(task: gt.Task) -> Iterator[int]:
+    """The variables that conditions of a task read, and that its changes see."""
+    yield from variables(task.goal)
+    for action in task.actions:
+        yield from variables(action.precondition)
+        yield from _guards(action.factors)
+        for change in action.changes:
+            yield from change.seen
+    for template in task.templates:
+        yield from variables(template.precondition)
+        yield from _guards(template.factors)
+        yield from (setting.variable for setting in all_settings(template.factors))
+        for part in gt.walk_body(template.body):
+            if isinstance(part, gt.BodyCondition):
+                yield from variables(part.condition)
+
+
+def _guards(factors: Iterable[gt.Factor]) -> Iterator[int]:
+    for effect in gt.effects_of(factors):
+        if effect.when is not None:
+            yield from variables(effect.when)
+    for charge in gt.charges_of(factors):
+        yield from variables(charge.when)

@@ -1,0 +1,159 @@
+"""What hidden facts do to a task: figures worked out by hand."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+import bbtc
+from bbtc import pipeline
+from bbtc.diagnostics import Report
+from bbtc.ground.task import Task
+from bbtc.limits import Limits
+from bbtc.source import SourceFile
+from tests.ground.examples import task_of
+from tests.long_form import amount
+
+
+def best(task: Task) -> tuple[Fraction, Fraction]:
+    """P* and the least expected cost of attaining it."""
+    value = bbtc.bounds(task, costs=True)
+    assert value.lower == value.upper
+    assert value.cost is not None
+    return value.lower, value.cost
+
+
+SEARCH = """(define (domain search) (:types place)
+  (:predicates (at ?p - place) (held))
+  (:action look :parameters (?p - place) :observe {})
+  (:action take :parameters (?p - place) :precondition (at ?p) :effect (held)))
+(define (problem x) (:domain search) (:objects a b c - place)
+  (:init {}) (:goal (held)))"""
+
+
+@pytest.mark.parametrize(
+    ("init", "told", "expected"),
+    [
+        # Two looks settle three places: 1/3 (1 + 1), 1/3 (2 + 1), and after two misses the last is known.
+        ("(oneof (at a) (at b) (at c))", "(at ?p)", (1, Fraction(8, 3))),
+        # Nothing may be there: 1/8 of the worlds have no goal; places are independent.
+        ("(unknown (at a)) (unknown (at b)) (unknown (at c))", "(at ?p)", (Fraction(7, 8), None)),
+        # One of them holds something: 4/7 · 2, 2/7 · 3, and the last is known after two looks.
+        ("(or (at a) (at b) (at c))", "(at ?p)", (1, Fraction(4, 7) * 2 + Fraction(3, 7) * 3)),
+        ("(at b)", "(at ?p)", (1, 1)),
+        # What is told of two facts as a whole joins them; of two told one by one, it does not.
+        ("(oneof (at a) (at b))", "(or (at ?p) (at b))", (1, 2)),
+    ],
+)
+def test_a_search_costs_what_it_does_by_hand(
+    init: str, told: str, expected: tuple[Fraction, Fraction | None]
+) -> None:
+    probability, cost = best(task_of(SEARCH.format(told, init)))
+    assert probability == expected[0]
+    assert expected[1] is None or cost == expected[1]
+
+
+def test_a_formula_is_known_where_its_parts_are_not() -> None:
+    """Exactly one of two is true, so `or` is known at once, and a plan need not look."""
+    text = """(define (domain d) (:predicates (a) (b) (done)) (:action look :observe (a))
+      (:action go :precondition (or (a) (b)) :effect (done)))
+      (define (problem x) (:domain d) (:init {}) (:goal (done)))"""
+    assert best(task_of(text.format("(oneof (a) (b))"))) == (1, 1)
+    assert best(task_of(text.format("(unknown (a)) (unknown (b))")))[0] == Fraction(1, 2)
+
+
+def test_visible_facts_in_a_formula_are_settled_by_cases() -> None:
+    """The lamp shines by the switch that the hidden fact names: whatever it is, with both on."""
+    text = """(define (domain d) (:types s) (:predicates (wired ?s - s) (on ?s - s) (done))
+      (:action flip :parameters (?s - s) :effect (on ?s))
+      (:action trace :parameters (?s - s) :observe (wired ?s))
+      (:action read :precondition (exists (?s - s) (and (wired ?s) (on ?s))) :effect (done)))
+      (define (problem x) (:domain d) (:objects l r - s)
+        (:init (oneof (wired l) (wired r))) (:goal (done)))"""
+    # Both switches, then read; a look at the wires costs as much as a second switch.
+    assert best(task_of(text)) == (1, 3)
+
+
+def test_effects_under_hidden_conditions_are_hidden_until_told() -> None:
+    text = """(define (domain d) (:predicates (ill) (red) (cured))
+      (:action test :effect (when (ill) (red)))
+      (:action read :observe (red))
+      (:action treat :precondition (ill) :effect (cured))
+      (:action discharge :precondition (not (ill)) :effect (cured)))
+      (define (problem x) (:domain d) (:init (unknown (ill))) (:goal (cured)))"""
+    assert best(task_of(text)) == (1, 3)
+
+
+def test_what_is_observed_and_left_to_chance_is_not_seen() -> None:
+    """An egg that may be bad is smelled; without that, nobody knows."""
+    text = """(define (domain d) (:predicates (bad) (have) (eaten))
+      (:action get :precondition (not (have)) :effect (and (have) (oneof (bad) (not (bad)))))
+      (:action smell :precondition (have) :observe (bad))
+      (:action throw :precondition (have) :effect (not (have)))
+      (:action eat :precondition (and (have) (not (bad))) :effect (eaten)))
+      (define (problem x) (:domain d) (:init) (:goal (eaten)))"""
+    task = task_of(text)
+    assert [component.facts for component in task.components] == [("bad()",)]
+    # get, smell, and with 1/2 throw and again: x = 2 + 1/2 (1 + x) + 1/2.
+    assert best(task) == (1, 6)
+
+
+def test_noise_tells_nothing_for_sure() -> None:
+    text = """(define (domain tiger) (:predicates (left) (out))
+      (:action listen :observe (probabilistic 0.85 (left)))
+      (:action open :precondition (left) :effect (out)))
+      (define (problem x) (:domain tiger) (:init (unknown (left))) (:goal (out)))"""
+    task = task_of(text)
+    (component,) = task.components
+    assert component.prior == ((0, Fraction(1, 2)), (1, Fraction(1, 2)))
+    (observation,) = task.action_by_name["listen()"].changes[0].observations
+    assert observation.accuracy == Fraction(17, 20)
+
+
+def test_a_fact_made_unknown_is_drawn_anew() -> None:
+    text = """(define (domain d) (:predicates (heads) (won))
+      (:action toss :effect (unknown (heads)))
+      (:action look :observe (heads))
+      (:action claim :precondition (heads) :effect (won)))
+      (define (problem x) (:domain d) (:init (unknown (heads))) (:goal (won)))"""
+    # look, and with 1/2 toss and look again: x = 1 + 1/2 · 1 + 1/2 (1 + x).
+    assert best(task_of(text)) == (1, 4)
+
+
+def test_domains_without_hidden_state_keep_their_meaning() -> None:
+    """Facts of the start are seen draws there, and what is unknown has nothing behind it."""
+    text = """(define (domain d) (:predicates (p) (done))
+      (:action look :precondition (unknown (p)) :effect (probabilistic 0.5 (p) 0.5 (not (p))))
+      (:action go :precondition (p) :effect (done)))
+      (define (problem x) (:domain d) (:init (unknown (p))) (:goal (done)))"""
+    task = task_of(text)
+    assert task.components == ()
+    assert best(task) == (Fraction(1, 2), Fraction(3, 2))
+
+
+# --- public problems -----------------------------------------------------------------------------
+
+
+def _published() -> list[tuple[str, str, int, Fraction]]:
+    table = Path(__file__).parents[3] / "shared" / "hidden" / "optima.tsv"
+    if not table.is_file():
+        return []
+    rows = [line.split("\t") for line in table.read_text("utf-8").splitlines() if line[:1] != "#"]
+    return [(row[0], row[1], int(row[3]), Fraction(row[5])) for row in rows if row[0] != "domain"]
+
+
+@pytest.mark.parametrize(
+    ("domain", "problem", "beliefs", "cost"),
+    [row for row in _published() if row[2] <= amount(400, 13_000)],
+    ids=lambda value: str(value).rpartition("/")[2],
+)
+def test_public_problems_have_the_published_figures(
+    domain: str, problem: str, beliefs: int, cost: Fraction, corpus: Path
+) -> None:
+    sources = [SourceFile(each, (corpus / each).read_text("utf-8")) for each in (domain, problem)]
+    task = pipeline.compile_sources(sources, Report(), Limits())
+    probability, least = best(task)
+    assert probability == 1
+    assert abs(least - cost) < Fraction(1, 10_000)

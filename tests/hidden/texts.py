@@ -1,0 +1,80 @@
+"""Random small domains with hidden state, as text."""
+
+from __future__ import annotations
+
+from hypothesis import strategies as st
+
+HIDDEN = ["h", "i", "j"]
+SEEN = ["s", "t"]
+
+
+def _literal(atoms: list[str]) -> st.SearchStrategy[str]:
+    return st.builds(lambda atom, true: f"({atom})" if true else f"(not ({atom}))",
+                     st.sampled_from(atoms), st.booleans())  # fmt: skip
+
+
+def _condition(atoms: list[str]) -> st.SearchStrategy[str]:
+    literal = _literal(atoms)
+    several = st.lists(literal, min_size=2, max_size=2)
+    return st.one_of(
+        literal,
+        st.builds(lambda word, parts: f"({word} {' '.join(parts)})", st.sampled_from(["and", "or"]), several),
+    )
+
+
+@st.composite
+def _effect(draw: st.DrawFn) -> str:
+    parts = []
+    for _ in range(draw(st.integers(1, 2))):
+        # A seen fact that reads a hidden one would be hidden: that happens, too, but seldom.
+        target = draw(_literal(SEEN if draw(st.integers(0, 2)) else HIDDEN))
+        kind = draw(st.integers(0, 5))
+        if kind == 0:
+            target = f"(when {draw(_condition([*HIDDEN, *SEEN]))} {target})"
+        elif kind == 1:
+            target = f"(probabilistic 1/3 {target})"
+        elif kind == 2:
+            target = f"(oneof {target} {draw(_literal([*HIDDEN, *SEEN]))})"
+        parts.append(target)
+    return f"(and {' '.join(parts)})"
+
+
+@st.composite
+def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
+    """A domain and a problem with up to three hidden facts and two seen ones."""
+    atoms = [*HIDDEN, *SEEN]
+    actions = []
+    for number in range(draw(st.integers(2, 5))):
+        form = f"(:action a{number}"
+        if draw(st.booleans()):
+            form += f" :precondition {draw(_condition(atoms))}"
+        kind = draw(st.integers(0, 3))
+        if kind < 3:
+            told = draw(_condition(HIDDEN)) if draw(st.booleans()) else f"({draw(st.sampled_from(atoms))})"
+            if noise and draw(st.booleans()):
+                told = f"(probabilistic 3/4 ({draw(st.sampled_from(HIDDEN))}))"
+            form += f" :observe {told}"
+        if kind in {0, 3}:
+            form += f" :effect {draw(_effect())}"
+        actions.append(form + ")")
+    init = [f"({atom})" for atom in SEEN if draw(st.booleans())]
+    for atom in HIDDEN:
+        kind = draw(st.integers(0, 3))
+        init += [f"(unknown ({atom}))"] if kind < 2 else [f"({atom})"] if kind == 2 else []
+    kind = draw(st.integers(0, 3))
+    if kind == 1:
+        init = [each for each in init if each[1] in "ust"]
+        init.append(f"(oneof {' '.join(f'({atom})' for atom in HIDDEN)})")
+    elif kind == 2:
+        init = [each for each in init if each[1] in "ust"]
+        init.append(f"(or (h) {draw(_literal(['i', 'j']))})")
+    elif kind == 3:
+        init = [each for each in init if each != "(h)" and each != "(unknown (h))"]
+        init.append("(probabilistic 1/4 (h))")
+    goal = " ".join(draw(st.lists(_literal(atoms), min_size=1, max_size=2, unique_by=lambda each: each[-4:])))
+    return (
+        f"(define (domain d) (:predicates {' '.join(f'({atom})' for atom in atoms)})\n  "
+        + "\n  ".join(actions)
+        + "\n  (:action mark :observe (h)))\n"
+        f"(define (problem x) (:domain d) (:init {' '.join(init)}) (:goal (and {goal})))"
+    )
