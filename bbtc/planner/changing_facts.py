@@ -86,11 +86,7 @@ class ChangingFacts:
         """Where one change may lead from a state, and how probably: whatever may move is as likely to do so,
         then each of the values that it may take, then each way for other facts to give way. Empty where
         nothing can move."""
-        ways: list[list[list[Values]]] = []
-        for movable in self.movables:
-            found = [self._settled(state, sets) for sets in movable.moves(state)]
-            ways.append([each for each in found if each])
-        ways = [each for each in ways if each]
+        ways = self._ways(state)
         merged: dict[Values, Fraction] = {}
         for moves in ways:
             for after in moves:
@@ -98,6 +94,18 @@ class ChangingFacts:
                     chance = Fraction(1, len(ways) * len(moves) * len(after))
                     merged[values] = merged.get(values, Fraction(0)) + chance
         return tuple((chance, values) for values, chance in sorted(merged.items()))
+
+    def successors(self, state: Values) -> list[Values]:
+        """The states of :meth:`changes`."""
+        return sorted({values for moves in self._ways(state) for after in moves for values in after})
+
+    def _ways(self, state: Values) -> list[list[list[Values]]]:
+        """For each that can move, and each of its moves, the states where that may lead."""
+        ways = []
+        for movable in self.movables:
+            moves = [self._settled(state, sets) for sets in movable.moves(state)]
+            ways.append([after for after in moves if after])
+        return [moves for moves in ways if moves]
 
     def _settled(self, state: Values, sets: _Sets) -> list[Values]:
         """The states after a move with the fewest other facts changed, so that no group is contradicted; none
@@ -128,7 +136,8 @@ class ChangingFacts:
 
     def _lacking(self, state: Values, fixed: dict[int, Truth]) -> list[tuple[int, Truth]] | None:
         """What could change next to mend the first group that is contradicted; None if none is."""
-        for number in sorted({number for variable in fixed for number in self._around.get(variable, ())}):
+        numbers = {number for variable in fixed for number in self._around.get(variable, ())}
+        for number in sorted(numbers) if numbers else ():
             group = self.groups[number]
             true = [v for v in group.members if fixed.get(v, state[v]) == Truth.TRUE]
             if len(true) > 1:

@@ -25,6 +25,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from bbtc.belief.draws import Values
 from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import (
@@ -105,11 +106,15 @@ def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateS
     facts = ChangingFacts.of(task, limits)
     own = initial_belief(task)
     wider, all_of_them = endless, False
+    looked: set[Values] = set()
     while True:
         states = [space.packing.values(space.states, row) for row in range(len(space.states))]
         few = len(states) <= _FEW_STATES
         known = set(states)
-        starts = changed(facts, states if few else spread(states, MOST_VISITED), limits)
+        # Where those lead that were looked at before is among the states already.
+        looking = [each for each in (states if few else spread(states, MOST_VISITED)) if each not in looked]
+        looked.update(looking)
+        starts = changed(facts, looking, limits)
         new = [tuple(map(Truth, values)) for values in starts if values not in known]
         if not new:
             all_of_them = few

@@ -81,7 +81,7 @@ def test_trees_of_our_domains_keep_to_their_conditions_in_any_state(problem: Pro
 def test_trees_keep_to_their_conditions_in_any_state_and_succeed_as_often(
     task: Task, strategy: str, retries: Retries
 ) -> None:
-    limits = Limits(seconds=20, states=20_000, nodes=200)
+    limits = Limits(states=20_000, nodes=200)
     options = Options(retries=retries)
     try:
         plain = planned(task, strategy, replace(options, closed_world=True), limits)
