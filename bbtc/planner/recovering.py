@@ -111,10 +111,10 @@ def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateS
         states = [space.packing.values(space.states, row) for row in range(len(space.states))]
         few = len(states) <= _FEW_STATES
         known = set(states)
+        looking = states if few else spread(states, MOST_VISITED)
         # Where those lead that were looked at before is among the states already.
-        looking = [each for each in (states if few else spread(states, MOST_VISITED)) if each not in looked]
+        starts = changed(facts, looking, limits, looked)
         looked.update(looking)
-        starts = changed(facts, looking, limits)
         new = [tuple(map(Truth, values)) for values in starts if values not in known]
         if not new:
             all_of_them = few
