@@ -243,19 +243,12 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
 
     def results(number: int, seen: bytes) -> dict[Draw, Fraction]:
         belief = beliefs.by_number[number]
-        parts = [(weight, part) for world, weight in belief for part in kernel.of(world, seen)]
-        # Whole numbers in the common denominator of all probabilities: they are added and divided often.
-        scale = lcm(*{part.probability.denominator for _, part in parts})
-        total = scale * sum(weight for _, weight in belief)
-        by_told: dict[_Told, dict[int, int]] = {}
+        by_told = kernel.certain(belief, seen)
         amounts: dict[_Told, tuple[Fraction, Fraction]] = {}
-        for weight, part in parts:
-            mass = by_told.setdefault(part.told, {})
-            added = weight * part.probability.numerator * (scale // part.probability.denominator)
-            mass[part.world] = mass.get(part.world, 0) + added
-            if part.cost or part.reward:
-                cost, reward = amounts.get(part.told, (ZERO, ZERO))
-                amounts[part.told] = cost + added * part.cost, reward + added * part.reward
+        scale = 1
+        if by_told is None:
+            by_told, amounts, scale = kernel.drawn(belief, seen)
+        total = scale * sum(weight for _, weight in belief)
         drawn: dict[Draw, Fraction] = {}
         for told, mass in by_told.items():
             whole = sum(mass.values())
@@ -266,7 +259,7 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
             sets += [(first + at, octet) for at, octet in enumerate(after.to_bytes(PLACES, "big"))]
             key = tuple(sorted(sets)), cost / whole, reward / whole
             drawn[key] = drawn.get(key, ZERO) + Fraction(whole, total)
-        spend(len(parts), len(drawn))
+        spend(len(belief), len(drawn))
         return drawn
 
     return draw
@@ -292,6 +285,46 @@ class _Kernel:
         self._observations = [_compile(observation) for observation in change.observations]
         self._spend = spend
         self._known: dict[tuple[int, bytes], list[_Part]] = {}
+        self._only: dict[bytes, dict[int, tuple[_Told, int] | None]] = {}
+        """By what is seen before, and world: what the robot sees, and the world after, if that is certain."""
+
+    def certain(self, belief: Belief, seen: bytes) -> dict[_Told, dict[int, int]] | None:
+        """By what the robot sees, the worlds after with their weights; None where chance, or what is added to
+        cost or reward, has a part in it."""
+        only = self._only.setdefault(seen, {})
+        found: dict[_Told, dict[int, int]] = {}
+        for world, weight in belief:
+            if world not in only:
+                parts = self.of(world, seen)
+                sure = len(parts) == 1 and not parts[0].cost and not parts[0].reward
+                only[world] = (parts[0].told, parts[0].world) if sure else None
+            known = only[world]
+            if known is None:
+                return None
+            mass = found.get(known[0])
+            if mass is None:
+                mass = found[known[0]] = {}
+            mass[known[1]] = mass.get(known[1], 0) + weight
+        return found
+
+    def drawn(
+        self, belief: Belief, seen: bytes
+    ) -> tuple[dict[_Told, dict[int, int]], dict[_Told, tuple[Fraction, Fraction]], int]:
+        """By what the robot sees, the worlds after with their weights, and what is added to cost and reward,
+        with the same weights; they are whole in the unit of the last, the common denominator of all
+        probabilities, since they are added and divided often."""
+        parts = [(weight, part) for world, weight in belief for part in self.of(world, seen)]
+        scale = lcm(*{part.probability.denominator for _, part in parts})
+        found: dict[_Told, dict[int, int]] = {}
+        amounts: dict[_Told, tuple[Fraction, Fraction]] = {}
+        for weight, part in parts:
+            mass = found.setdefault(part.told, {})
+            added = weight * part.probability.numerator * (scale // part.probability.denominator)
+            mass[part.world] = mass.get(part.world, 0) + added
+            if part.cost or part.reward:
+                cost, reward = amounts.get(part.told, (ZERO, ZERO))
+                amounts[part.told] = cost + added * part.cost, reward + added * part.reward
+        return found, amounts, scale
 
     def of(self, world: int, seen: bytes) -> list[_Part]:
         """All that it may do in a world."""

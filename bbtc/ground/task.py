@@ -334,24 +334,29 @@ def charges_of(factors: Iterable[Factor]) -> Iterator[Charge]:
     return (charge for outcome in outcomes_of(factors) for charge in outcome.charges)
 
 
-def apparent_factors(task: Task, doing: GroundAction | GroundTemplate) -> tuple[Factor, ...]:
-    """The factors of an action or a guide and, for what it does to hidden facts, all that it might make seen
-    or known: more than can be, with no probabilities of their own, for what relaxes the task."""
-    if not isinstance(doing, GroundAction) or not doing.changes:
-        return doing.factors
-    found = list(doing.factors)
-    for change in doing.changes:
-        component = task.components[change.component]
-        facts = len(component.facts)
+def seen_factors(task: Task, action: GroundAction) -> tuple[Factor, ...]:
+    """The factors of an action and, of what it does to hidden facts, all it might set of seen variables:
+    more than can be, with no probabilities of their own, for what relaxes the task."""
+    found = list(action.factors)
+    for change in action.changes:
+        facts = len(task.components[change.component].facts)
         for effect in effects_of(change.factors):
             sets = ((local - facts, value) for local, value in effect.sets if local >= facts)
             if seen := tuple((change.seen[at], value) for at, value in sets):
                 found.append(Factor((Outcome(ONE, (Effect(None, seen),)),)))
-        third = Fraction(1, 3)
-        for knowledge in component.known:
-            maybe = (Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth)
-            found.append(Factor(tuple(maybe)))
     return tuple(found)
+
+
+def apparent_factors(task: Task, doing: GroundAction | GroundTemplate) -> tuple[Factor, ...]:
+    """:func:`seen_factors` and all that an action might make known, likewise; of a guide, its factors."""
+    if not isinstance(doing, GroundAction) or not doing.changes:
+        return doing.factors
+    third = Fraction(1, 3)
+    return seen_factors(task, doing) + tuple(
+        Factor(tuple(Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth))
+        for change in doing.changes
+        for knowledge in task.components[change.component].known
+    )
 
 
 def walk_body(body: Body) -> Iterator[Body]:

@@ -16,12 +16,12 @@ from bbtc.ground.effects import EffectLowering, LoweredEffect
 from bbtc.ground.goal import unreachable
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normalise
-from bbtc.ground.prune import reordered
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.reachability.bulk import consumed, instances
 from bbtc.ground.reachability.reach import Reach, reach
 from bbtc.ground.reachability.usage import called
 from bbtc.ground.refused import refused
+from bbtc.ground.renumber import reordered
 from bbtc.ground.start import Beginning, beginning
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth

@@ -21,6 +21,9 @@
    tree is not asked for, plan as in 3 and 4 once more, for what others may make of visited states, too
    (:mod:`bbtc.planner.elsewhere`).
 
+Where facts are hidden: an optimal policy over what is believed, a search over refinements, and, where neither
+met the target, greedy refinement.
+
 ``advised`` trusts templates, their author's advice on how things are done, more than figures: where a task
 has some, and refinement meets the target, its tree is taken; else ``auto``.
 """
@@ -81,6 +84,7 @@ _MOST_RECOVERING = 60_000
 _REFINE_STATES = 20_000
 """States of one simulation while refining for a second opinion."""
 
+_POLICY_SHARE = 0.7  # of the time, where facts are hidden
 _SEARCH_SHARE, _SURE_SHARE = 0.4, 0.5  # of the time left
 
 
@@ -182,6 +186,9 @@ class _Auto:
     def run(self, refined: Plan | None) -> None:
         """Make plans; ``refined`` is what refinement made, if it fell short of the target before."""
         task, target, limits, options = self.task, self.target, self.limits, self.options
+        if task.components:
+            self.of_hidden(refined)
+            return
         if self.learns(_FEW_STATES, everywhere=True) and self.proven:
             return
         self.add(plan_search(task, target, limits.part(_SEARCH_SHARE), _silent, options))
@@ -190,9 +197,19 @@ class _Auto:
                 self.add(step())
         if not self.interrupted:
             self.add(self.refinement(refined))
-        if not self.interrupted and not options.closed_world and not task.components:
+        if not self.interrupted and not options.closed_world:
             with suppress(LimitReached):
                 self.go_on_from_elsewhere()
+
+    def of_hidden(self, refined: Plan | None) -> None:
+        """Plans where facts are hidden: what others do is left out, and a policy is what readings are best
+        for."""
+        task, target, options = self.task, self.target, self.options
+        self.add(plan_policy(task, target, self.limits.part(_POLICY_SHARE), _silent, options))
+        if not self.interrupted:
+            self.add(plan_search(task, target, self.limits.part(_SEARCH_SHARE), _silent, options))
+        if not self.interrupted and not self.met:
+            self.add(self.refinement(refined))
 
     def looked_at(self, candidate: _Candidate) -> _Candidate:
         """What the tree does from where others may leave the world; nothing good if that takes too long."""
@@ -303,7 +320,7 @@ class _Auto:
 
     def surely(self) -> Plan | None:
         """A policy over partial states, unless there is none that surely reaches the goal."""
-        if self.upper < 1 or self.task.components:
+        if self.upper < 1:
             return None
         limits = self.limits.part(_SURE_SHARE)
         if self.met:

@@ -27,7 +27,7 @@ from bbtc.ground.condition import (
     replaced,
     variables,
 )
-from bbtc.ground.prune import reordered
+from bbtc.ground.renumber import reordered
 from bbtc.ground.task import (
     ONE,
     Change,

@@ -19,7 +19,7 @@ from bbtc.ground.hidden.physical import Physical, physical
 from bbtc.ground.hidden.relevance import relevant
 from bbtc.ground.hidden.uncertain import hidden_facts
 from bbtc.ground.hidden.worlds import TooManyWorlds, Worlds, given_true
-from bbtc.ground.prune import reordered
+from bbtc.ground.renumber import reordered
 from bbtc.ground.start import MOST_WORLDS, contradicted
 from bbtc.kleene import Truth
 from bbtc.limits import Limits

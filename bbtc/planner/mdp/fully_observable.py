@@ -8,21 +8,19 @@ only believed, counts as met.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from math import prod
 
 from bbtc.ground.condition import TRUE, Condition, Is, Known, negation, replaced, variables
+from bbtc.ground.renumber import Renumbering
 from bbtc.ground.task import (
     ONE,
     Change,
-    Charge,
-    Effect,
     Factor,
     GroundAction,
     InitialState,
-    Outcome,
     Task,
     Variable,
     charges_of,
@@ -68,9 +66,9 @@ class _Seeing:
                 predicate, args = split_name(fact)
                 name = f"world-{number + 1}-{predicate}"  # nothing that is read reaches a tree
                 self._facts.append(Variable(name, args, three_valued=False))
-            shift = _renumbering(first.__add__)
+            world = Renumbering({at: first + at for at in range(len(component.facts))})
             for each in component.known:
-                self._known[each.variable] = replaced(each.condition, shift) if each.at_least == 1 else TRUE
+                self._known[each.variable] = world.condition(each.condition) if each.at_least == 1 else TRUE
 
     def task(self) -> Task:
         """All of it."""
@@ -109,33 +107,8 @@ class _Seeing:
             action, precondition=replaced(action.precondition, self._seen), factors=factors, changes=()
         )
 
-    def _factors(self, change: Change) -> Iterator[Factor]:
+    def _factors(self, change: Change) -> tuple[Factor, ...]:
         first, facts = self._first[change.component], len(self._task.components[change.component].facts)
-
-        def variable(local: int) -> int:
-            return first + local if local < facts else change.seen[local - facts]
-
-        return (_renumbered(factor, variable) for factor in change.factors)
-
-
-def _renumbering(variable: Callable[[int], int]) -> Callable[[Is | Known], Condition]:
-    return lambda leaf: replace(leaf, variable=variable(leaf.variable))
-
-
-def _renumbered(factor: Factor, variable: Callable[[int], int]) -> Factor:
-    """A factor over other variables."""
-    leaf = _renumbering(variable)
-
-    def effect(each: Effect) -> Effect:
-        when = None if each.when is None else replaced(each.when, leaf)
-        return Effect(when, tuple((variable(number), value) for number, value in each.sets))
-
-    def outcome(each: Outcome) -> Outcome:
-        return replace(
-            each,
-            effects=tuple(map(effect, each.effects)),
-            factors=tuple(_renumbered(inner, variable) for inner in each.factors),
-            charges=tuple(Charge(replaced(c.when, leaf), c.cost, c.reward) for c in each.charges),
-        )
-
-    return replace(factor, outcomes=tuple(map(outcome, factor.outcomes)))
+        local = {at: first + at for at in range(facts)}
+        local |= {facts + at: variable for at, variable in enumerate(change.seen)}
+        return Renumbering(local).factors(change.factors)

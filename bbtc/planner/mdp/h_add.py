@@ -23,7 +23,7 @@ from typing_extensions import assert_never
 
 from bbtc.belief.draws import Values
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.task import Factor, Task, apparent_factors
+from bbtc.ground.task import Factor, Knowledge, Task, apparent_factors, seen_factors
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import Packing, Words
@@ -42,6 +42,8 @@ _LONG = 16  # rows in a group; of longer ones there are few
 _DEAREST = 100.0  # where actions count one, an outcome costs no more than this, however improbable
 _LEAST_COST = 2.0**-10
 """What an action costs at least here, so that longer ways cost more."""
+_TOLD = 2.0
+"""What it takes besides, that what is told is what is wanted."""
 _LEAST_PROBABILITY = 1 / LARGEST
 
 
@@ -101,6 +103,7 @@ class Relaxation:
         self._combined: dict[Condition, int] = {}
         self._always = 3 * len(task.variables)  # a fact that holds, and one that never does
         self._count = self._always + 2
+        self._told = [self._tells(component.known) for component in task.components if count_actions]
         for number, action in enumerate(task.actions):
             if number % _ACTIONS_AT_ONCE == 0:
                 limits.check_time("planning")
@@ -108,13 +111,25 @@ class Relaxation:
             cost, dearest = max(rounded(action.cost), _LEAST_COST), _NEVER
             if count_actions:
                 cost, dearest = 1.0, _DEAREST
-            for operator in operators_of(number, apparent_factors(task, action)):
+            # Who asks what makes a fact asks for actions; else what tells of a component is one fact.
+            whole = apparent_factors if not count_actions else seen_factors
+            for change in action.changes if count_actions else ():
+                self._add(Operator(-1, None, Fraction(1), ()), cost, needs, [self._told[change.component]])
+            for operator in operators_of(number, whole(task, action)):
                 more = [] if operator.when is None else self._body(operator.when)
                 heads = [3 * variable + int(value) for variable, value in operator.sets]
                 weight = min(dearest, cost / max(_LEAST_PROBABILITY, float(operator.probability)))
                 self._add(operator, weight, [*needs, *more], heads)
         self._goal: Index = np.array(self._body(task.goal), dtype=np.int64)
         self._index()
+
+    def _tells(self, known: Iterable[Knowledge]) -> int:
+        """A fact from which all may follow that can be known."""
+        told, self._count = self._count, self._count + 1
+        for each in known:
+            heads = [3 * each.variable + int(value) for value in Truth]
+            self._add(Operator(-1, None, Fraction(1), ()), _TOLD, [told], heads)
+        return told
 
     def _add(self, operator: Operator, cost: float, body: list[int], heads: Iterable[int]) -> None:
         number = len(self.operators)
