@@ -431,6 +431,7 @@ def plan_task(
     from bbtc.planner.guard import guarded
     from bbtc.planner.options import DEFAULTS
     from bbtc.planner.strategies import run_strategy
+    from bbtc.planner.subgoals import with_subgoals
     from bbtc.tree.validate import check_tree
 
     wanted = task.goal_probability if target is None else target
@@ -465,6 +466,7 @@ def plan_task(
     if stopping is not None:
         plan = stopping.tree_of(plan, Limits(states=limits.states))
     task = plan.tree.task
+    plan = replace(plan, tree=replace(plan.tree, root=with_subgoals(task, plan.tree.root)))
     check_tree(plan.tree)
     broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))
     if broken:

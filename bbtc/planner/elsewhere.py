@@ -7,7 +7,7 @@ an initial state, or one group of facts that exclude one another, such as the pl
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -58,16 +58,13 @@ def starts_elsewhere(task: Task, limits: Limits, visited: Iterable[Values] = ())
     return [tuple(map(Truth, values)) for values in spread(found, MOST_STARTS)]
 
 
-def changed(
-    facts: ChangingFacts, states: Iterable[Values], limits: Limits, but: Container[Values] = ()
-) -> list[Values]:
-    """Where one change leads from some states, ``but`` for these. Raises ``LimitReached``."""
+def changed(facts: ChangingFacts, states: Iterable[Values], limits: Limits) -> list[Values]:
+    """Where one change leads from some states. Raises ``LimitReached``."""
     found: dict[Values, None] = {}
     for number, values in enumerate(states):
         if number % _LOOK == 0:
             limits.check_time("the search for a tree that recovers")
-        if values not in but:
-            found.update(dict.fromkeys(facts.successors(values)))
+        found.update(dict.fromkeys(facts.changed(values)))
     return [*found]
 
 
