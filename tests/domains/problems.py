@@ -133,7 +133,9 @@ def artefacts(problem: Problem, *, saved: bool = False) -> dict[str, bytes]:
         return done
 
     made["task.json"] = run("compile", *problem.files).out
-    planned = run("plan", *(["-"] if saved else problem.files), *problem.switches, stdin=made["task.json"])
+    source = ["-"] if saved else problem.files
+    # Without the usual limit of a minute, which a busy machine may exceed.
+    planned = run("plan", *source, *problem.switches, "--time-limit", "none", stdin=made["task.json"])
     made["tree.json"], made["plan.txt"] = planned.out, planned.err.encode()
     for name, form in EXPORTS.items():
         made[name] = run("export", "-", "--to", form, stdin=planned.out).out
