@@ -138,7 +138,7 @@ class Exact:
     def success_from(self, states: Iterable[State], ticks: int) -> dict[State, float]:
         """The chance of success within a number of ticks from each of these states, if nothing changes by
         itself: what :meth:`chances` says with a rate of 0, by one iteration for all."""
-        starts: dict[State, Key] = {state: (state, (), ()) for state in states}
+        starts: dict[State, Key] = {state: (state, (), (), ()) for state in states}
         after: dict[Key, list[tuple[float, Key]]] = {}
         wins: dict[Key, float] = {}
         waiting = list(starts.values())
