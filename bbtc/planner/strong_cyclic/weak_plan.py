@@ -26,7 +26,7 @@ _QUEUES = (_HELPFUL, _NOVEL, _ALL)  # in this order where their priorities are e
 _BOOST = 1000  # expansions that helpful actions are preferred for after progress
 _STALLED = 250  # expansions without progress, after which the third queue is used, too
 PATIENCE = 100
-"""And after which the search by novelty is tried beside this one."""
+"""Expansions without progress, after which the search by novelty is tried beside this one."""
 _AT_THE_COST = 50  # operators of the relaxation: to expand a state takes as long as they do in an estimate
 _SHORT_WAY = 2  # steps of a relaxed plan that are worth following; single ones are tried anyway
 _LOOK = 64  # evaluations between two looks at the limits
