@@ -306,6 +306,31 @@ class HiddenText(Lifted):
         for world, p in belief:
             yield {**dict.fromkeys(world, 2), **marks}, world, p
 
+    def _drawn_anew(self, world: World, change: Mapping[Fact, int]) -> Iterator[tuple[World, Fraction]]:
+        """The worlds after a change, in which what becomes unknown is drawn."""
+        coins = [fact for fact, value in change.items() if value == 1]
+        kept = {fact for fact in world if change.get(fact, 2) == 2} | {f for f, v in change.items() if v == 2}
+        for picked in product([False, True], repeat=len(coins)):
+            heads = {fact for fact, true in zip(coins, picked, strict=True) if true}
+            p = _ONE
+            for fact in coins:
+                p *= self.odds.get(fact, _HALF) if fact in heads else 1 - self.odds.get(fact, _HALF)
+            yield frozenset(kept | heads), p
+
+    @cached_property
+    def odds(self) -> dict[Fact, Fraction]:
+        """How probable the start makes facts that have draws of their own."""
+        draws = [self.effect(form, {}, {}) for form in self.init if form[0] == "probabilistic"]
+        found: dict[Fact, Fraction] = {}
+        for fact in self.uncertain:
+            mine = [draw for draw in draws if any(fact in change for _, change, _ in draw)]
+            if mine and all({*change} <= {fact} for draw in mine for _, change, _ in draw):
+                misses = _ONE
+                for draw in mine:
+                    misses *= sum((p for p, change, _ in draw if change.get(fact) != 2), Fraction(0))
+                found[fact] = 1 - misses
+        return found
+
     def chance(self, form: Form, belief: Belief) -> Fraction:
         """How probable a condition is."""
         true = (p for values, _, p in self.values_in(belief) if self.value(form, {}, values) == 2)
@@ -325,7 +350,7 @@ class HiddenText(Lifted):
         move, by_told = self.moves[name], dict[_Told, dict[World, Fraction]]()
         for values, world, p in self.values_in(belief):
             for q, change, _ in self.effect(move.effect, move.bound, values):
-                for after, r in _drawn_anew(world, change):
+                for after, r in self._drawn_anew(world, change):
                     seen = after - self.hidden
                     for told, s in self.readings(name, move.bound, after).items():
                         mass = by_told.setdefault((seen, told), {})
@@ -392,12 +417,3 @@ def _parts(form: Form) -> list[Any]:
 def _belief(weights: Mapping[World, Fraction]) -> Belief:
     whole = sum(weights.values())
     return frozenset((world, weight / whole) for world, weight in weights.items() if weight)
-
-
-def _drawn_anew(world: World, change: Mapping[Fact, int]) -> Iterator[tuple[World, Fraction]]:
-    """The worlds after a change, in which what becomes unknown is true or false, as likely."""
-    coins = [fact for fact, value in change.items() if value == 1]
-    kept = {fact for fact in world if change.get(fact, 2) == 2} | {f for f, v in change.items() if v == 2}
-    for picked in product([False, True], repeat=len(coins)):
-        heads = {fact for fact, true in zip(coins, picked, strict=True) if true}
-        yield frozenset(kept | heads), _HALF ** len(coins)

@@ -63,9 +63,7 @@ def test_a_start_that_cannot_be(init: str, code: str, place: str | None) -> None
         ("(probabilistic 1.5 (h))", "BBT0210"),
         ("(probabilistic 0.5 (and (h) (i)))", "BBT0406"),
         ("(probabilistic 0.5 (and))", "BBT0406"),
-        ("()", "BBT0406"),
-        ("(and)", "BBT0406"),
-        ("(or)", "BBT0406"),
+        ("(unknown (h))", "BBT0406"),
         ("", "BBT0101"),
         ("(when (h) (i))", "BBT0101"),
         ("(nowhere)", "BBT0202"),
@@ -74,6 +72,13 @@ def test_a_start_that_cannot_be(init: str, code: str, place: str | None) -> None
 def test_an_observation_of_nothing_or_of_no_sense(told: str, code: str) -> None:
     found = refusals(TEXT.format(told=told, init="(unknown (h))"))
     assert [each for each, _ in found] == [code]
+
+
+@pytest.mark.parametrize("told", ["()", "(and)", "(or)", "(done)"])
+def test_an_observation_that_tells_nothing_is_warned_of(told: str) -> None:
+    report = Report()
+    compile_sources([SourceFile("x.pddl", TEXT.format(told=told, init="(unknown (h))"))], report, Limits())
+    assert "BBT0417" in {each.code for each in report}
 
 
 def test_a_draw_of_very_many_branches_is_refused() -> None:
@@ -87,8 +92,11 @@ def test_a_draw_of_very_many_branches_is_refused() -> None:
     assert found[0] == "BBT0404"
 
 
-WORDS = """( ) () not and or oneof probabilistic unknown known when :observe :effect 1/3 -1 0 1e999 ?x forall
-    imply nobody (h) (or) (unknown(h)) (oneof(h)(i))""".split()
+WORDS = [
+    *("(", ")", "()", "not", "and", "or", "oneof", "probabilistic", "unknown", "known", "when", "forall"),
+    *(":observe", ":effect", "1/3", "-1", "0", "1e999", "?x", "imply", "nobody"),
+    *("(h)", "(or)", "(unknown(h))", "(oneof(h)(i))"),
+]
 
 
 @st.composite
@@ -115,4 +123,3 @@ def test_broken_texts_are_compiled_or_refused_by_name(text: str) -> None:
     """Anything else that is raised would be a traceback."""
     for code, _ in refusals(text):
         assert code in CODES, text
-

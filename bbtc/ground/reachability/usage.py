@@ -40,11 +40,12 @@ class Usage:
         self.start = start
         self.blocks = {name: normalise(schema.effect) for name, schema in model.schemas.items()}
         self.set_values = md.set_values(model)
-        self.clouded = self._clouded() if has_hidden_state(model) else frozenset()
-        """Predicates whose facts may be hidden though none is at the start."""
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
         self.open = open_predicates(model)
+        self.hides = has_hidden_state(model)
+        """Is there hidden state? Then what becomes unknown is true, or false."""
+        self.doubted = self._doubted() if self.hides else set[str]()
         self._readers: dict[str, set[str]] = {}
         """By predicate: the derived ones that a rule computes from it."""
         for rule in model.rules:
@@ -65,28 +66,31 @@ class Usage:
     def can_be_unknown(self, predicate: str) -> bool:
         """Whether some atom of the predicate may be unknown at some time."""
         if predicate in self.derived:
-            return predicate not in self.unchanging and self.model.predicates[predicate].three_valued
-        made = Truth.UNKNOWN in self.set_values.get(predicate, ()) or predicate in self.clouded
-        return made or bool(self.start.unknown.get(predicate))
+            possible = self.hides or self.model.predicates[predicate].three_valued
+            return predicate not in self.unchanging and possible
+        if predicate in self.doubted:
+            return True
+        return Truth.UNKNOWN in self.set_values.get(predicate, ()) or bool(self.start.unknown.get(predicate))
 
-    def values_of(self, leaf: me.Set) -> tuple[Truth, ...]:
-        """The values that an atom may have for the robot once an effect has set it: it need not see that the
-        effect happened, and what becomes unknown is drawn."""
-        if leaf.predicate not in self.clouded:
-            return (leaf.value,)
-        return tuple(Truth) if leaf.value is Truth.UNKNOWN else (leaf.value, Truth.UNKNOWN)
-
-    def _clouded(self) -> frozenset[str]:
-        """Predicates that an effect makes unknown, or sets under a condition or by chance."""
-        found: set[str] = set()
-        for block in self.blocks.values():
-            plain = set(map(id, block.items))
-            for item, _ in items(block, ()):
-                if isinstance(item.leaf, me.Set) and (
-                    item.guard or item.leaf.value is Truth.UNKNOWN or id(item) not in plain
-                ):
-                    found.add(item.leaf.predicate)
-        return frozenset(found)
+    def _doubted(self) -> set[str]:
+        """Predicates of which something asks whether they are known, and which effects that read hidden facts
+        may leave unknown: any that an effect sets, for all that is known here."""
+        formulas = [schema.precondition for schema in self.model.schemas.values()]
+        formulas += [
+            guard for schema in self.model.schemas.values() for guard in me.conditions(schema.effect)
+        ]
+        formulas += [
+            condition for each in self.model.templates.values() for condition in md.conditions(each.body)
+        ]
+        formulas += [rule.condition for rule in self.model.rules]
+        formulas += [] if self.model.goal is None else [self.model.goal]
+        asked = {
+            reading.atom.predicate
+            for formula in formulas
+            for reading in mf.readings(formula)
+            if reading.value in {Truth.UNKNOWN, None}
+        }
+        return asked & self.set_values.keys()
 
     def _only_reading(self, base: set[str]) -> set[str]:
         """Derived predicates that only read, all the way down, predicates of ``base``. Where these are
