@@ -67,6 +67,7 @@ HOSTILE_NAMES = st.one_of(
     st.text(st.characters(exclude_categories=["Cs"]), max_size=8),
 )
 CONTROL_KINDS: list[ControlKind] = ["sequence", "fallback", "skipper"]
+_RETRIES: st.SearchStrategy[ControlKind] = st.sampled_from(["retry", "retry-until-success"])
 BODY_KINDS: list[Literal["sequence", "fallback", "skipper"]] = ["sequence", "fallback", "skipper"]
 STATUSES: list[PlanStatus] = ["target-reached", "out-of-reach", "stuck", "limit-reached", "interrupted"]
 
@@ -300,7 +301,7 @@ def nodes(draw: st.DrawFn, task: Task, depth: int = 3) -> Node:
                 if not draw(st.integers(0, 4)):
                     child = node(level - 1, passive)
                     attempts = draw(st.integers(1, 3))
-                    return ControlNode(name, "retry", (child,), draw(labels), attempts=attempts)
+                    return ControlNode(name, draw(_RETRIES), (child,), draw(labels), attempts=attempts)
                 kind = draw(st.sampled_from(CONTROL_KINDS))
                 count = draw(st.integers(1, 3))
                 children = tuple(

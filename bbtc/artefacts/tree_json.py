@@ -30,6 +30,7 @@ from bbtc.ground.condition import TRUE
 from bbtc.ground.task import Task
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import (
+    COUNTING,
     ActionNode,
     ConditionNode,
     ControlKind,
@@ -168,9 +169,9 @@ class _Reader:
             return ConditionNode("", TRUE)
 
     def _control(self, at: At, level: int, kind: ControlKind) -> ControlNode:
-        required = ["id", "type", "children", *(["attempts"] if kind == "retry" else [])]
+        required = ["id", "type", "children", *(["attempts"] if kind in COUNTING else [])]
         members = at.members(required, _LABELS)
-        attempts = members["attempts"].count() if kind == "retry" else None
+        attempts = members["attempts"].count() if kind in COUNTING else None
         name = members["id"].string()
         children: list[Node] = []
         for child in children_at(members["children"], level):  # a loop: few frames for each level

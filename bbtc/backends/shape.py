@@ -26,7 +26,7 @@ from bbtc.ground.describe import describe
 from bbtc.ground.task import Task, Variable, ground_name
 from bbtc.kleene import Truth
 from bbtc.printable import printable
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, tree_depth
+from bbtc.tree.nodes import COUNTING, ActionNode, ConditionNode, ControlNode, Node, tree_depth
 
 DEEPEST_TREE = 250
 """Levels of nodes an exported tree may have: BehaviorTree.CPP reads 256 levels of XML, and py_trees
@@ -34,8 +34,9 @@ needs a Python frame or two a level."""
 
 _LONGEST_LABEL = 60
 
-DEEPEST_CONDITION = 50
-"""Levels of ``and``, ``or`` and ``not`` an exported condition may have."""
+DEEPEST_CONDITION = 100
+"""Levels of ``and``, ``or`` and ``not`` an exported condition may have, as many as are read by default: each
+is a level of XML, besides some 130 of the tree around it, or a parenthesis of Python, which takes 200."""
 
 
 def fit(root: Node, engine: str) -> Node:
@@ -69,7 +70,8 @@ def _merged(root: Node) -> Node:
                 children: list[Node] = []
                 for child in node.children:
                     new = done[id(child)]
-                    if isinstance(new, ControlNode) and new.kind == node.kind:
+                    same = isinstance(new, ControlNode) and new.kind == node.kind
+                    if isinstance(new, ControlNode) and same and node.kind not in COUNTING:
                         children.extend(new.children)
                     else:
                         children.append(new)

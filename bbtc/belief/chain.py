@@ -44,6 +44,10 @@ class Chain:
     action: tuple[int, ...]
     edges: tuple[tuple[Edge, ...], ...]
     initial: tuple[tuple[Fraction, int], ...]
+    forgets: bool = False
+    """May latched actions start again, as the tree has retry-until-success nodes?"""
+    given_up: tuple[int, ...] = ()
+    """States whose action is running when the next tick gives it up, though nothing has changed."""
     doubtful: Mapping[int, Fraction] = field(default_factory=dict)
     """Final states in which the root succeeds though the goal need not be true, and how probably it is."""
 
@@ -77,7 +81,7 @@ def explore(
             transitions[node.action] = compile_action(task, task.action_by_name[node.action], limits)
         steps.append(transitions[node.action])
     tick = compile_tick(task, root)
-    on_start = memory_of(root).started
+    memory = memory_of(root)
     index: dict[State, int] = {}
     states: list[State] = []
 
@@ -93,6 +97,7 @@ def explore(
     status: list[NodeStatus] = []
     started: list[int] = []
     edges: list[tuple[Edge, ...]] = []
+    given_up: list[int] = []
     doubtful: dict[int, Fraction] = {}
     if task.endless_beliefs:
         limits = replace(limits, states=min(limits.states, MOST_BELIEVED))
@@ -108,9 +113,21 @@ def explore(
             started.append(-1)
             edges.append(())
             continue
-        action = returned - STARTED
-        finished = state.finished + on_start[action]  # a latched node that starts has not finished
+        action = memory.action(returned)
+        finished = memory.after(state.finished, returned)
+        if memory.forgets and tick(state.values, memory.during(state.finished, returned)) != STARTED + action:
+            given_up.append(len(status))
         status.append(NodeStatus.RUNNING)
         started.append(action)
         edges.append(tuple(Edge(r, number(State(r.values, finished))) for r in steps[action](state.values)))
-    return Chain(actions, tuple(states), tuple(status), tuple(started), tuple(edges), initial, doubtful)
+    return Chain(
+        actions,
+        tuple(states),
+        tuple(status),
+        tuple(started),
+        tuple(edges),
+        initial,
+        memory.forgets,
+        tuple(given_up),
+        doubtful,
+    )

@@ -12,11 +12,12 @@ def same_runs(task: Task, chain: Chain, other: Node) -> bool:
     """Does another tree do in every run what the tree of a chain does? Then their scenarios, and so all
     their figures, are equal.
 
-    Both trees are run side by side, on the states of the chain with what the other tree remembers.
+    Both trees are run side by side, on the states of the chain with what the other tree remembers. An action
+    that the other tree gives up while it runs, though nothing changes, is not the same.
     """
     tick = compile_tick(task, other)
     names = [node.action for node in actions_of(other)]
-    on_start = memory_of(other).started
+    remembered = memory_of(other)
     pairs = dict.fromkeys((state, 0) for _, state in chain.initial)
     waiting = list(pairs)
     while waiting:
@@ -26,11 +27,16 @@ def same_runs(task: Task, chain: Chain, other: Node) -> bool:
             if chain.action[state] >= 0 or chain.status[state] != returned:
                 return False
             continue
-        started = returned - STARTED
+        started = remembered.action(returned)
         if chain.action[state] < 0 or chain.actions[chain.action[state]].action != names[started]:
             return False
+        if remembered.forgets:
+            during = remembered.during(memory, returned)
+            if tick(chain.states[state].values, during) != STARTED + started:
+                return False
+        after = remembered.after(memory, returned)
         for edge in chain.edges[state]:
-            pair = (edge.successor, memory + on_start[started])
+            pair = (edge.successor, after)
             if pair not in pairs:
                 pairs[pair] = None
                 waiting.append(pair)

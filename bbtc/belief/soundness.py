@@ -1,4 +1,4 @@
-"""The four soundness invariants of a tree (semantics page, "Post-checks")."""
+"""The five soundness invariants of a tree (semantics page, "Post-checks")."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ def violations(task: Task, chain: Chain) -> list[str]:
     1. An action is only started where its precondition is true. 2. Root success implies the goal, where
     nothing is hidden; else what is taken for true and is not is counted
     (:attr:`bbtc.belief.simulate.Figures.mistaken`).
-    3. The probabilities of the ways to end sum to 1. 4. A tree of latched actions halts.
+    3. The probabilities of the ways to end sum to 1. 4. A tree of latched actions halts. 5. No action that
+    runs is given up while nothing changes: what it would have done is no outcome of its then.
     """
     found: dict[str, None] = {}
     for state, action in zip(chain.states, chain.action, strict=True):
@@ -35,6 +36,9 @@ def violations(task: Task, chain: Chain) -> list[str]:
     total = sum((visits[index] or Fraction(0) for index in chain.final), Fraction(0))
     if total + absorption.entering() != 1:
         found[f"the probabilities of all ends sum to {total}, not 1"] = None
-    if all(action.latched for action in chain.actions) and absorption.endless:
+    for number in chain.given_up:
+        found[f"{chain.actions[chain.action[number]].action} is given up while it runs"] = None
+    latched = all(action.latched for action in chain.actions) and not chain.forgets
+    if latched and absorption.endless:
         found["a tree of latched actions never ends"] = None
     return list(found)

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 from bbtc.belief.draws import Values
 from bbtc.belief.state import State, Transition, compile_action, initial_belief
-from bbtc.belief.tick import STARTED, NodeStatus, Tick, compile_tick, memory_of
+from bbtc.belief.tick import STARTED, Memory, NodeStatus, Tick, compile_tick, memory_of
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.markov import distribution
@@ -28,13 +28,15 @@ class Branch:
 class Moment:
     """A tick: the state it reads, the status every node it reached returned (by node id), and the
     action node it started, None at the end of the run. ``branches`` are the possible outcomes of
-    that action, the most probable first; outcomes that differ only in cost are one."""
+    that action, the most probable first; outcomes that differ only in cost are one. ``after`` is what is
+    remembered then."""
 
     state: State
     statuses: dict[str, NodeStatus]
     status: NodeStatus
     action: ActionNode | None
     branches: tuple[Branch, ...]
+    after: int = 0
 
 
 @dataclass(slots=True)
@@ -54,13 +56,12 @@ class Stepper:
     _transitions: dict[str, Transition] = field(default_factory=dict, init=False)
     _statuses: dict[str, NodeStatus] = field(default_factory=dict, init=False)
     _actions: list[ActionNode] = field(init=False)
-    _started: dict[str, int] = field(init=False)
+    _memory: Memory = field(init=False)
     _returned: Tick = field(init=False)
 
     def __post_init__(self) -> None:
         self._actions = list(actions_of(self.root))
-        bits = memory_of(self.root).started
-        self._started = {node.id: bit for node, bit in zip(self._actions, bits, strict=True)}
+        self._memory = memory_of(self.root)
         self._returned = compile_tick(self.task, self.root, self._observe)
 
     @property
@@ -89,8 +90,7 @@ class Stepper:
         moment = self.now
         assert moment.action is not None
         index = self._draw(moment.branches, len(self.moments)) if choice is None else choice
-        finished = moment.state.finished + self._started[moment.action.id]
-        self.moments.append(self._tick(State(moment.branches[index].values, finished)))
+        self.moments.append(self._tick(State(moment.branches[index].values, moment.after)))
 
     def back(self) -> bool:
         """Take the last step back; False at the start."""
@@ -115,13 +115,14 @@ class Stepper:
         returned = self._returned(state.values, state.finished)
         if returned < STARTED:
             return Moment(state, statuses, NodeStatus(returned), None, ())
-        action = self._actions[returned - STARTED]
+        action = self._actions[self._memory.action(returned)]
         if action.action not in self._transitions:
             ground = self.task.action_by_name[action.action]
             self._transitions[action.action] = compile_action(self.task, ground, self.limits)
         results = self._transitions[action.action](state.values)
         after = distribution((result.values, result.probability) for result in results)
-        return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(after))
+        remembered = self._memory.after(state.finished, returned)
+        return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(after), remembered)
 
 
 def _branches(belief: dict[Values, Fraction]) -> tuple[Branch, ...]:

@@ -154,7 +154,7 @@ class _Sampler:
         self._ready = [compile_condition(action.precondition) for action in actions]
         careful = careful_actions(task, root, limits)
         self._run = [careful[action.name] for action in actions]
-        self._on_start = memory_of(root).started
+        self._memory = memory_of(root)
         self.scale = math.lcm(1, *(cost.denominator for action in actions for cost in _costs(action)))
         self._nodes: dict[tuple[Values, int], _Node] = {}
         self._after: dict[Values, tuple[Draw, list[Values]]] = {}
@@ -186,10 +186,10 @@ class _Sampler:
         if status == NodeStatus.SUCCESS:
             node.won = self._goal(node.values) == Truth.TRUE
         if status >= STARTED:
-            action = status - STARTED
+            action = self._memory.action(status)
             node.ready = self._ready[action](node.values) == Truth.TRUE
             node.draw, node.costs, after = self._outcomes(action, node.values)
-            memory = node.memory + self._on_start[action]
+            memory = self._memory.after(node.memory, status)
             node.next = [self._node(values, memory) for values in after]
         return status
 

@@ -52,7 +52,7 @@ from bbtc.planner.objective import UNSEEN, Elsewhere, Worth, allowance, best_of
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.planner.recovering import Recovering, recovering_tree
 from bbtc.planner.result import Plan, Progress, Refinement
-from bbtc.planner.strong_cyclic.plan import plan_strong_cyclic
+from bbtc.planner.strong_cyclic.plan import plan_strong_cyclic, sure_starts
 from bbtc.planner.synthesis.policy import plan_policy
 from bbtc.rewrite.repeat import with_repeats
 from bbtc.tree.nodes import Node
@@ -63,17 +63,27 @@ MANY_ACTIONS = 500
 STATES_AND_ACTIONS = 200_000
 """For a second opinion, states times actions of the task are explored up to this number."""
 
+_WORK_ELSEWHERE = 50_000
+"""The same for a policy from states that others may leave the world in."""
+
 LARGE_TREE = 100
 """Nodes; a tree of more is hard to read, and a second opinion on it worth more work."""
 
-_WORK_FOR_LARGE = 3_000_000
-"""States times actions explored for a second opinion on a large tree: some seconds."""
+_WORK_FOR_LARGE = 1_000_000
+"""States times actions explored for a second opinion on a large tree, or for one that recovers: a second or
+two."""
 
 _LOOKS = 150
 """Looks at the clock in the search for a policy over partial states, for a second opinion."""
 
-_LOOKS_ELSEWHERE = 1500
+_LOOKS_ELSEWHERE = 50
 """The same for policies from states that others may leave the world in."""
+
+_LOOKS_RECOVERING = 1500
+"""The same for rules for all states."""
+
+_LOOKS_FIRST = 500
+"""The same in the search over refinements, before others are tried."""
 
 _FEW_STATES = 500
 """States for which rules are learnt before anything else is tried."""
@@ -81,10 +91,14 @@ _FEW_STATES = 500
 _MOST_RECOVERING = 60_000
 """States for which a tree that recovers from anywhere is made."""
 
+
 _REFINE_STATES = 20_000
 """States of one simulation while refining for a second opinion."""
 
 _POLICY_SHARE = 0.7  # of the time, where facts are hidden
+_STATES_ELSEWHERE = 5_000
+"""States of the simulation of a tree from where others may leave the world."""
+
 _SEARCH_SHARE, _SURE_SHARE = 0.4, 0.5  # of the time left
 
 
@@ -150,6 +164,8 @@ class _Auto:
     """The task, beginning in states that others may leave it in."""
     learnt: bool = False
     """Are rules for all states looked for no more?"""
+    begun: int = 0
+    """The number of the plan of the search that was tried first."""
 
     @property
     def plans(self) -> list[Plan]:
@@ -185,19 +201,19 @@ class _Auto:
 
     def run(self, refined: Plan | None) -> None:
         """Make plans; ``refined`` is what refinement made, if it fell short of the target before."""
-        task, target, limits, options = self.task, self.target, self.limits, self.options
-        if task.components:
+        if self.task.components:
             self.of_hidden(refined)
             return
         if self.learns(_FEW_STATES, everywhere=True) and self.proven:
             return
-        self.add(plan_search(task, target, limits.part(_SEARCH_SHARE), _silent, options))
-        for step in (self.of_few_states, self.surely, self.of_all_states):
+        self.begun = len(self.candidates)
+        self.add(self.searched(replace(self.limits, effort=Effort(_LOOKS_FIRST))))
+        for step in (self.of_few_states, self.surely, self.searched_on, self.of_all_states):
             if not self.interrupted:
                 self.add(step())
         if not self.interrupted:
             self.add(self.refinement(refined))
-        if not self.interrupted and not options.closed_world:
+        if not self.interrupted and not self.options.closed_world:
             with suppress(LimitReached):
                 self.go_on_from_elsewhere()
 
@@ -215,7 +231,7 @@ class _Auto:
         """What the tree does from where others may leave the world; nothing good if that takes too long."""
         if self.elsewhere is None:
             return candidate
-        few = replace(self.limits, states=min(self.limits.states, _REFINE_STATES))
+        few = replace(self.limits, states=min(self.limits.states, _STATES_ELSEWHERE))
         try:
             found = elsewhere_of(explore(self.elsewhere, candidate.plan.tree.root, few), candidate.plan.chain)
         except LimitReached:
@@ -235,7 +251,7 @@ class _Auto:
         self.learns(_MOST_RECOVERING)
         if self.best.recovers or self.options.prefer == "size":
             return
-        few = replace(self.limits, states=max(1, STATES_AND_ACTIONS // len(task.actions)))
+        few = replace(self.limits, states=max(1, _WORK_ELSEWHERE // len(task.actions)))
         with suppress(LimitReached):
             wider = also_at(task, starts)
             self.add_for_own_starts(plan_policy(wider, self.target, few, _silent, self.inner, whole=True))
@@ -248,7 +264,7 @@ class _Auto:
         if self.learnt or self.options.closed_world or not 0 < actions <= MANY_ACTIONS:
             return False
         most = min(self.limits.states, most, max(1, _WORK_FOR_LARGE // actions))
-        limits = replace(self.limits.part(_SURE_SHARE), states=most, effort=Effort(_LOOKS_ELSEWHERE))
+        limits = replace(self.limits.part(_SURE_SHARE), states=most, effort=Effort(_LOOKS_RECOVERING))
         try:
             found = recovering_tree(self.task, limits, everywhere=everywhere)
             self.learnt = True
@@ -275,13 +291,10 @@ class _Auto:
     def surely_from(self, starts: Sequence[tuple[Truth, ...]]) -> None:
         """A policy over partial states for those of the starts from which one surely reaches the goal."""
         limits = replace(self.limits.part(_SURE_SHARE), effort=Effort(_LOOKS_ELSEWHERE))
-
-        def surely(task: Task) -> Plan:
-            return plan_strong_cyclic(task, Fraction(1), limits, _silent, self.inner)
-
-        sure = [each for each in starts if surely(only_at(self.task, [each])).tree.success_probability == 1]
+        sure = sure_starts(only_at(self.task, starts), limits)
         if sure:
-            self.add_for_own_starts(surely(also_at(self.task, sure)))
+            wider = also_at(self.task, sure)
+            self.add_for_own_starts(plan_strong_cyclic(wider, Fraction(1), limits, _silent, self.inner))
 
     @property
     def inner(self) -> Options:
@@ -304,6 +317,18 @@ class _Auto:
             bounds = recovers.bounds.lower, recovers.bounds.upper
             plan = replace(plan, tree=replace(plan.tree, bounds=bounds))
         self.add(plan, recovers)
+
+    def searched(self, limits: Limits) -> Plan:
+        """Search over refinements."""
+        return plan_search(self.task, self.target, limits.part(_SEARCH_SHARE), _silent, self.options)
+
+    def searched_on(self) -> Plan | None:
+        """The same in full, where nothing met the target, and the first search did not come to its end."""
+        stop = self.candidates[self.begun].plan.stop
+        if stop is None or self.met or self.upper <= self.best.worth.success:
+            return None
+        del self.candidates[self.begun]
+        return self.searched(self.limits)
 
     def of_few_states(self) -> Plan | None:
         """An optimal policy, where a moment is enough to explore the whole space."""

@@ -9,7 +9,7 @@ that a can that falls from the gripper leaves it empty.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -86,11 +86,7 @@ class ChangingFacts:
         """Where one change may lead from a state, and how probably: whatever may move is as likely to do so,
         then each of the values that it may take, then each way for other facts to give way. Empty where
         nothing can move."""
-        ways: list[list[list[Values]]] = []
-        for movable in self.movables:
-            found = [self._settled(state, sets) for sets in movable.moves(state)]
-            ways.append([each for each in found if each])
-        ways = [each for each in ways if each]
+        ways = self._ways(state)
         merged: dict[Values, Fraction] = {}
         for moves in ways:
             for after in moves:
@@ -99,7 +95,20 @@ class ChangingFacts:
                     merged[values] = merged.get(values, Fraction(0)) + chance
         return tuple((chance, values) for values, chance in sorted(merged.items()))
 
-    def _settled(self, state: Values, sets: _Sets) -> list[Values]:
+    def changed(self, state: Values) -> list[Values]:
+        """The states of :meth:`changes`, in the same order."""
+        return sorted({values for moves in self._ways(state) for after in moves for values in after})
+
+    def _ways(self, state: Values) -> list[list[list[Values]]]:
+        """For each fact or group that may move, the states after each of its moves."""
+        holding = [[v for v in group.members if state[v] == Truth.TRUE] for group in self.groups]
+        ways: list[list[list[Values]]] = []
+        for movable in self.movables:
+            found = [self._settled(state, sets, holding) for sets in movable.moves(state)]
+            ways.append([each for each in found if each])
+        return [each for each in ways if each]
+
+    def _settled(self, state: Values, sets: _Sets, holding: Sequence[Sequence[int]]) -> list[Values]:
         """The states after a move with the fewest other facts changed, so that no group is contradicted; none
         if that takes too many."""
         waiting: dict[tuple[tuple[int, Truth], ...], None] = {tuple(sorted(sets.items())): None}
@@ -112,7 +121,7 @@ class ChangingFacts:
                 if tried > _MOST_TRIED:
                     return []
                 now = dict(fixed)
-                more = self._lacking(state, now)
+                more = self._lacking(now, holding)
                 if more is None:
                     after = bytearray(state)
                     for variable, value in fixed:
@@ -126,14 +135,20 @@ class ChangingFacts:
             waiting = further
         return []
 
-    def _lacking(self, state: Values, fixed: dict[int, Truth]) -> list[tuple[int, Truth]] | None:
-        """What could change next to mend the first group that is contradicted; None if none is."""
+    def _lacking(
+        self, fixed: dict[int, Truth], holding: Sequence[Sequence[int]]
+    ) -> list[tuple[int, Truth]] | None:
+        """What could change next to mend the first group that is contradicted; None if none is. ``holding``
+        are the members of each group that are true before."""
         for number in sorted({number for variable in fixed for number in self._around.get(variable, ())}):
             group = self.groups[number]
-            true = [v for v in group.members if fixed.get(v, state[v]) == Truth.TRUE]
-            if len(true) > 1:
-                return [(v, Truth.FALSE) for v in true if v not in fixed][:1]
-            if group.always and not true:
+            still = [v for v in holding[number] if v not in fixed]
+            true = sum(
+                value == Truth.TRUE and number in self._around.get(v, ()) for v, value in fixed.items()
+            )
+            if true + len(still) > 1:
+                return [(v, Truth.FALSE) for v in still[:1]]
+            if group.always and not true and not still:
                 return [(v, Truth.TRUE) for v in group.members if v not in fixed]
         return None
 

@@ -64,7 +64,7 @@ def changed(facts: ChangingFacts, states: Iterable[Values], limits: Limits) -> l
     for number, values in enumerate(states):
         if number % _LOOK == 0:
             limits.check_time("the search for a tree that recovers")
-        found.update((after, None) for _, after in facts.changes(values))
+        found.update(dict.fromkeys(facts.changed(values)))
     return [*found]
 
 

@@ -92,6 +92,9 @@ class _Guarding:
                 assert_never(node)
 
     def _control(self, node: ControlNode, last: _Last, *, bounded: bool) -> Node:
+        if node.kind == "retry-until-success":
+            last = _Last(of_all=False, of_retry=last.of_retry)  # it has its turn again itself
+            return replace(node, children=(self.node(node.children[0], last, bounded=bounded),))
         if node.kind == "retry":
             (child,) = node.children
             return replace(node, children=(self.node(child, _Last(last.of_all, last.of_all), bounded=True),))

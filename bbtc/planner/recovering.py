@@ -25,6 +25,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from bbtc.belief.draws import Values
 from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import (
@@ -105,11 +106,15 @@ def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateS
     facts = ChangingFacts.of(task, limits)
     own = initial_belief(task)
     wider, all_of_them = endless, False
+    looked_at: set[Values] = set()
     while True:
         states = [space.packing.values(space.states, row) for row in range(len(space.states))]
         few = len(states) <= _FEW_STATES
         known = set(states)
-        starts = changed(facts, states if few else spread(states, MOST_VISITED), limits)
+        # What the others may become was found to be known before.
+        fresh = [values for values in states if values not in looked_at]
+        starts = changed(facts, fresh if few else spread(states, MOST_VISITED), limits)
+        looked_at = known
         new = [tuple(map(Truth, values)) for values in starts if values not in known]
         if not new:
             all_of_them = few
@@ -200,6 +205,7 @@ class _Learner:
         self.graph, self.space = found.graph, found.space
         space = found.space
         self.hopeful = ~found.prob_0 & ~space.goal
+        self._hoping = self.hopeful[space.choice_state]
         values = space.packing.unpack(space.states)
         self.literals = literals_of(values)
         self.stated = Stated(task, self.literals)
@@ -233,18 +239,21 @@ class _Learner:
 
     # --- what may be chosen where -----------------------------------------------------------------
 
-    def _taken(self, decided: npt.NDArray[np.int64], visited: Flags) -> Flags:
-        """The choices that are taken, or may still be."""
-        at = self.space.choice_state
-        free = np.where(visited[at], self.choices.best, self.choices.near) & ~self.given_up
-        taken: Flags = np.where(decided[at] >= 0, self.space.choice_action == decided[at], free)
-        return taken & self.hopeful[at]
+    def _taken(self, decided: npt.NDArray[np.int64], free: Flags) -> Flags:
+        """The choices that are taken, and where nothing is decided, those that are free."""
+        own = decided[self.space.choice_state]
+        taken: Flags = np.where(own >= 0, self.space.choice_action == own, free)
+        return taken & self._hoping
+
+    def _free(self, visited: Flags) -> Flags:
+        """The choices that may be taken where nothing is decided, and runs visit some states."""
+        fit = np.where(visited[self.space.choice_state], self.choices.best, self.choices.near)
+        free: Flags = fit & ~self.given_up
+        return free
 
     def _visited(self) -> Flags:
         """The states that runs may visit."""
-        at = self.space.choice_state
-        own = self.decided[at]
-        taken = np.where(own >= 0, self.space.choice_action == own, self.choices.best) & self.hopeful[at]
+        taken = self._taken(self.decided, self.choices.best)
         found = np.zeros(len(self.decided), dtype=np.bool_)
         found[self.space.closure(self.space.start, taken)] = True
         return found
@@ -261,24 +270,33 @@ class _Learner:
     def deciding(self) -> Iterator[tuple[tuple[Literal, ...], int]]:
         """The rules that lead to the goal."""
         visited = self._visited()
+        before: Flags | None = None
         while True:
             self.limits.check_time("the search for a tree that recovers")
-            taken = self._taken(self.decided, visited)
+            free = self._free(visited)
+            taken = self._taken(self.decided, free)
             found = self._best(taken, self._stuck(visited) & self.asked)
             if found is None:
                 return
             rule, covered = found
             decided = self.decided.copy()
             decided[covered] = rule.action
-            before = self.graph.reach(self.space.goal, taken).found
-            after = self.graph.reach(self.space.goal, self._taken(decided, visited)).found
+            if before is None:
+                before = self._getting_on(taken)
+            after = self._getting_on(self._taken(decided, free))
             if self._given_up(rule.action, covered, before & ~after):
+                before = None
                 continue
             self.decided = decided
             self.undecided[covered] = False
-            visited = self._visited()
+            visited, last = self._visited(), visited
+            before = after if (visited == last).all() else None
             self.rules.append(rule)
             yield self._stated(rule)
+
+    def _getting_on(self, taken: Flags) -> Flags:
+        """The states from which choices may lead to the goal."""
+        return self.graph.reach(self.space.goal, taken).found
 
     def _given_up(self, action: int, covered: Index, lost: Flags) -> bool:
         """Give up choices of an action that would leave some states without a way; are there any?"""

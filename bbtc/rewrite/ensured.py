@@ -18,10 +18,10 @@ from typing import TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.belief.tick import STARTED, NodeStatus
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, negation
 from bbtc.ground.task import Task
-from bbtc.kleene import Truth
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of
+from bbtc.kleene import Truth, negate
+from bbtc.tree.nodes import COUNTING, ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of
 
 _ANY = 0b111  # a set of truth values: bit i stands for the value i
 _TWO = 0b101
@@ -73,7 +73,7 @@ def at_least(condition: Condition, value: Truth) -> Formula:
         case Or(parts):
             return Some(tuple([at_least(part, value) for part in parts]))
         case Not(part):
-            return at_most(part, Truth(2 - value))
+            return at_least(negation(part), value)
         case Constant(holds):
             return ALWAYS if holds else NEVER
         case _:
@@ -81,26 +81,8 @@ def at_least(condition: Condition, value: Truth) -> Formula:
 
 
 def at_most(condition: Condition, value: Truth) -> Formula:
-    """The condition has this value, false or unknown, or a smaller one."""
-    match condition:
-        case Is(variable, Truth.TRUE):
-            return Among(variable, _up_to(value))
-        case Is(variable, Truth.FALSE):
-            return Among(variable, _from(2 - value))
-        case Is(variable, _):
-            return Among(variable, _TWO)
-        case Known(variable):
-            return Among(variable, 1 << Truth.UNKNOWN)
-        case And(parts):
-            return Some(tuple([at_most(part, value) for part in parts]))
-        case Or(parts):
-            return All(tuple([at_most(part, value) for part in parts]))
-        case Not(part):
-            return at_least(part, Truth(2 - value))
-        case Constant(holds):
-            return NEVER if holds else ALWAYS
-        case _:
-            assert_never(condition)
+    """The condition has this value, false or unknown, or a smaller one: its negation is as great."""
+    return at_least(negation(condition), negate(value))
 
 
 def _from(value: int) -> int:
@@ -149,7 +131,7 @@ def returned(task: Task, node: Node, status: NodeStatus, *, bounded: bool = Fals
         case ControlNode():
             bounded = bounded or node.kind == "retry"
             parts = [returned(task, child, status, bounded=bounded) for child in node.children]
-            if node.kind == "retry":
+            if node.kind in COUNTING:
                 return parts[0]
             if status is GO_ON[node.kind]:
                 return All(tuple(parts))
@@ -181,7 +163,7 @@ def may_return(task: Task, root: Node) -> dict[str, set[int]]:
             with facts.meanwhile():
                 for child in node.children:
                     visit(child, bounded=bounded)
-                    if node.kind != "retry":
+                    if node.kind not in COUNTING:
                         facts.add(returned(task, child, GO_ON[node.kind], bounded=bounded))
 
     visit(root, bounded=False)

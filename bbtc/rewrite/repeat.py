@@ -1,13 +1,13 @@
 """Equal attempts that follow one another, put together under a retry node.
 
-Rewrite rule, kept if both trees, run side by side, do the same (:mod:`bbtc.belief.same_runs`) and the tree
-gets smaller; a is an attempt, a Sequence of conditions, one action and a check of what came of it, or only
-some of them:
+Rewrite rules, kept if both trees, run side by side, do the same (:mod:`bbtc.belief.same_runs`) and the tree
+gets smaller:
 
-1. ``Fallback(…, a, a, a, …)`` becomes ``Fallback(…, Retry(3, b), …)``, where b is a without its latch, and
-   without the check: what the action is there for is read before the Fallback, in the next tick.
-
-An attempt of several actions is left as it is: a retry node counts starts of actions, and not such attempts.
+1. ``Fallback(…, a, a, a, …)`` becomes ``Fallback(…, Retry(3, b), …)``, where a is a Sequence of conditions,
+   one action and a check of what came of it, or only some of them, and b is a without its latch, and without
+   the check: what the action is there for is read before the Fallback, in the next tick.
+2. ``Fallback(…, a, a, a, …)`` becomes ``Fallback(…, Retry-until-success(3, a), …)`` for any other attempt a,
+   of several actions, say: a retry node counts starts of actions, this one counts attempts.
 """
 
 from __future__ import annotations
@@ -50,15 +50,22 @@ def _repeated(node: Node) -> Iterator[Node]:
         end = at + 1
         while end < len(node.children) and _equal(node.children[at], node.children[end]):
             end += 1
-        attempt = _again(node.children[at])
-        if end - at > 1 and attempt is not None:
-            retry = ControlNode(f"{node.children[at].id}.retry", "retry", (attempt,), attempts=end - at)
+        if end - at > 1 and any(actions_of(node.children[at])):
+            retry = _retry(node.children[at], end - at)
             children = (*node.children[:at], retry, *node.children[end:])
             yield retry if len(children) == 1 else replace(node, children=children)
         at = end
     for at, child in enumerate(node.children):
         for smaller in _repeated(child):
             yield replace(node, children=(*node.children[:at], smaller, *node.children[at + 1 :]))
+
+
+def _retry(attempt: Node, attempts: int) -> ControlNode:
+    """So many attempts, as one."""
+    name, again = f"{attempt.id}.retry", _again(attempt)
+    if again is not None:  # rule 1
+        return ControlNode(name, "retry", (again,), attempts=attempts)
+    return ControlNode(name, "retry-until-success", (attempt,), attempts=attempts)  # rule 2
 
 
 def _again(attempt: Node) -> Node | None:

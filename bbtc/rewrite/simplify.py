@@ -37,7 +37,16 @@ from bbtc.diagnostics import LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.rewrite.ensured import GO_ON, may_return
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of, walk
+from bbtc.tree.nodes import (
+    COUNTING,
+    ActionNode,
+    ConditionNode,
+    ControlKind,
+    ControlNode,
+    Node,
+    actions_of,
+    walk,
+)
 
 _MOST_TICKS = 200_000
 """Ticks spent on trying merged trees, each time."""
@@ -143,7 +152,7 @@ def _without_idle(root: Node, returned: Mapping[str, Set[int]]) -> Node:
     def kept(node: Node) -> Node:
         if not isinstance(node, ControlNode) or node.template is not None:
             return node
-        if node.kind == "retry":
+        if node.kind in COUNTING:
             return replace(node, children=(kept(node.children[0]),))
         goes_on = GO_ON[node.kind]
         children: list[Node] = []
@@ -246,7 +255,8 @@ def _same(one: Node, other: Node) -> bool:
             return one.action == other.action and not one.latched and not other.latched
         case ControlNode(), ControlNode():
             return (
-                one.kind == other.kind != "retry"
+                one.kind == other.kind
+                and one.kind not in COUNTING
                 and len(one.children) == len(other.children)
                 and all(map(_same, one.children, other.children))
             )

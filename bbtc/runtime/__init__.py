@@ -13,6 +13,7 @@ from bbtc.runtime.nodes import (
     Skipper,
     StopWhenBlocked,
     Try,
+    UntilSuccess,
     WithBeliefs,
     WithSetup,
     all_of,
@@ -24,6 +25,7 @@ from bbtc.runtime.nodes import (
     run,
     sequence,
     skipper,
+    until_success,
 )
 from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
@@ -40,6 +42,7 @@ __all__ = [
     "State",
     "StopWhenBlocked",
     "Try",
+    "UntilSuccess",
     "When",
     "WithBeliefs",
     "WithSetup",
@@ -56,4 +59,5 @@ __all__ = [
     "sequence",
     "simulate",
     "skipper",
+    "until_success",
 ]

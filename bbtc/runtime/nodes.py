@@ -151,6 +151,48 @@ class Retry(Decorator):
         return self.decorated.status
 
 
+class UntilSuccess(Decorator):
+    """Ticks its child again where it fails, so many times in all, in the same tick: nothing has changed
+    meanwhile. What the nodes below remember ends with the attempt; the attempts are counted anew after a
+    success, the last failure and a halt. (``py_trees.decorators.Retry`` leaves a tick between attempts.)"""
+
+    def __init__(self, name: str, attempts: int, child: Behaviour) -> None:
+        super().__init__(name=name, child=child)
+        self.attempts = attempts
+        self.failed = 0
+
+    def tick(self) -> Iterator[Behaviour]:
+        yield from self.decorated.tick()
+        while self.decorated.status == Status.FAILURE and self.failed + 1 < self.attempts:
+            self.failed += 1
+            self._forget()
+            yield from self.decorated.tick()
+        self.feedback_message = f"{self.failed} of {self.attempts} attempts failed"
+        self.status = self.decorated.status
+        if self.status != Status.RUNNING:
+            self.stop(self.status)
+        yield self
+
+    def update(self) -> Status:
+        return self.status
+
+    def terminate(self, new_status: Status) -> None:
+        del new_status
+        self.failed = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        for node in self.decorated.iterate():
+            if isinstance(node, Latch):
+                if node.decorated.status == Status.RUNNING:
+                    node.decorated.stop(Status.INVALID)
+                node._started, node._final = False, None
+            elif isinstance(node, Retry):
+                node.made = 0
+            elif isinstance(node, UntilSuccess):
+                node.failed = 0
+
+
 class Try(Latch):
     """An action below a Retry: it starts only if every Retry above it has an attempt left."""
 
@@ -204,6 +246,11 @@ def fallback(name: str, *children: Behaviour) -> Behaviour:
 def skipper(name: str, *children: Behaviour) -> Behaviour:
     """Goes on while children are running. Every tick starts at the first child."""
     return Skipper(name, children=list(children))
+
+
+def until_success(name: str, attempts: int, child: Behaviour) -> Behaviour:
+    """Tries its child so many times at most."""
+    return UntilSuccess(name, attempts, child)
 
 
 def retry(name: str, attempts: int, child: Behaviour) -> Behaviour:

@@ -17,7 +17,10 @@ from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
 from bbtc.tree.notebook import picture
 
-ControlKind: TypeAlias = Literal["sequence", "fallback", "skipper", "retry"]
+ControlKind: TypeAlias = Literal["sequence", "fallback", "skipper", "retry", "retry-until-success"]
+
+COUNTING: frozenset[ControlKind] = frozenset(("retry", "retry-until-success"))
+"""The kinds that have one child, and a number of attempts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +28,8 @@ class ControlNode:
     """Sequence (→), Fallback (?) or Skipper (⇒): goes on to the next child while the child
     returns success, failure or running, respectively. Retry (↻) has one child and returns what that
     returns; once ``attempts`` actions have been started below it, any further one fails instead.
+    Retry-until-success (↺) ticks its one child again when that fails, ``attempts`` times in all, and
+    forgets what is remembered below it after each time.
 
     ``template`` is the ground template this subtree was expanded from, ``reason`` the condition
     it was inserted for, ``name`` a label of its own.
@@ -154,8 +159,17 @@ def tree_depth(root: Node) -> int:
 
 def retries_of(node: Node) -> Iterator[tuple[ControlNode, int]]:
     """The retry nodes, parents before children, from left to right, each with its attempts."""
+    return _counting(node, "retry")
+
+
+def retries_until_success_of(node: Node) -> Iterator[tuple[ControlNode, int]]:
+    """The retry-until-success nodes, likewise."""
+    return _counting(node, "retry-until-success")
+
+
+def _counting(node: Node, kind: ControlKind) -> Iterator[tuple[ControlNode, int]]:
     for each in walk(node):
-        if isinstance(each, ControlNode) and each.attempts is not None:
+        if isinstance(each, ControlNode) and each.kind == kind and each.attempts is not None:
             yield each, each.attempts
 
 
@@ -165,6 +179,11 @@ def actions_of(node: Node) -> Iterator[ActionNode]:
 
 
 def tries_without_end(root: Node) -> bool:
-    """Whether nothing bounds how often some action starts: it is neither latched nor below a retry node."""
+    """Whether nothing bounds how often some action starts: it is not below a retry node, and not latched, or
+    only until a retry-until-success node forgets it."""
     bounded = {action.id for retry, _ in retries_of(root) for action in actions_of(retry)}
-    return any(not action.latched and action.id not in bounded for action in actions_of(root))
+    forgotten = {action.id for until, _ in retries_until_success_of(root) for action in actions_of(until)}
+    return any(
+        action.id not in bounded and (not action.latched or action.id in forgotten)
+        for action in actions_of(root)
+    )

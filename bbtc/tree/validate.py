@@ -39,8 +39,8 @@ ChildPath: TypeAlias = tuple[int, ...]
 
 def check_tree(tree: Tree) -> None:
     """Raise :class:`BbtcError` with every rule the tree breaks: ids are unique, control nodes have
-    children (a retry exactly one, and attempts), actions and variables exist in the task, only the
-    last child of a Skipper contains actions, no more than :data:`MAX_DEPTH` levels."""
+    children (of either kind of retry exactly one, and attempts), actions and variables exist in the task,
+    only the last child of a Skipper contains actions, no more than :data:`MAX_DEPTH` levels."""
     problems = [replace(each, path=()) for each in tree_problems(tree)]
     if problems:
         raise BbtcError(problems)
@@ -64,11 +64,11 @@ def tree_problems(tree: Tree) -> Iterator[Diagnostic]:
             case ActionNode():
                 if node.action not in task.action_by_name:
                     yield Diagnostic("BBT0606", f"no action is called '{node.action}'", path=path)
-            case ControlNode(kind="retry"):
+            case ControlNode(kind="retry" | "retry-until-success"):
                 if node.attempts is None or node.attempts < 1:
-                    yield Diagnostic("BBT0613", f"retry '{node.id}' allows no attempts", path=path)
+                    yield Diagnostic("BBT0613", f"{node.kind} '{node.id}' allows no attempts", path=path)
                 if len(node.children) > 1:
-                    yield Diagnostic("BBT0613", f"retry '{node.id}' has more than one child", path=path)
+                    yield Diagnostic("BBT0613", f"{node.kind} '{node.id}' has more than one child", path=path)
             case ControlNode():
                 if node.attempts is not None:
                     yield Diagnostic("BBT0613", f"{node.kind} '{node.id}' counts attempts", path=path)

@@ -107,6 +107,18 @@ def solvable_chain(task: Task, root: Node) -> Program:
 
 
 @dataclass(slots=True)
+class _Tries:
+    """Of a retry-until-success node: its number, the cell that counts its failed attempts, where there is a
+    further one, the action nodes below it, and the cells of what is remembered there."""
+
+    number: int
+    failed: int
+    left: Expression
+    actions: set[str] = field(default_factory=set)
+    below: set[int] = field(default_factory=set)
+
+
+@dataclass(slots=True)
 class _Writer:
     """What both forms share: the cells, and when an action node starts."""
 
@@ -121,6 +133,7 @@ class _Writer:
     outcomes: Outcomes = field(init=False)
     _done: dict[str, int] = field(default_factory=dict)
     _attempts: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    _tries: dict[str, _Tries] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         nodes = list(actions_of(self.root))
@@ -137,22 +150,36 @@ class _Writer:
             if node.latched:
                 meaning = f"has {node.action} finished?"
                 self._done[node.id] = self.draft.cell(Cell("done", node.id, meaning, 1))
-        self._note_attempts(self.root, [])
+        self._note_attempts(self.root, [], ())
         self.outcomes = Outcomes(self.draft, self.start.cell_of, self.most_branches)
         self.outcomes.prepare(actions)
 
-    def _note_attempts(self, node: Node, around: list[tuple[int, int]]) -> None:
+    def _note_attempts(self, node: Node, around: list[tuple[int, int]], tries: tuple[_Tries, ...]) -> None:
         match node:
             case ActionNode():
                 self._attempts[node.id] = around
+                for each in tries:
+                    each.actions.add(node.id)
+                    if node.latched:
+                        each.below.add(self._done[node.id])
             case ConditionNode():
                 pass
             case ControlNode():
-                if node.kind == "retry" and node.attempts is not None:
-                    cell = Cell("attempts", node.id, f"attempts made, of {node.attempts}", node.attempts)
-                    around = [*around, (self.draft.cell(cell), node.attempts)]
+                if node.attempts is not None:
+                    what = "made" if node.kind == "retry" else "failed"
+                    cell = Cell("attempts", node.id, f"attempts {what}, of {node.attempts}", node.attempts)
+                    number = self.draft.cell(cell)
+                    for each in tries:
+                        each.below.add(number)
+                    if node.kind == "retry":
+                        around = [*around, (number, node.attempts)]
+                    else:
+                        left = Compare(number, "<", node.attempts - 1) if node.attempts > 1 else NO
+                        own = _Tries(len(self._tries) + 1, number, left)
+                        self._tries[node.id] = own
+                        tries = (*tries, own)
                 for child in node.children:
-                    self._note_attempts(child, around)
+                    self._note_attempts(child, around, tries)
             case _:
                 assert_never(node)
 
@@ -161,18 +188,24 @@ class _Writer:
         """Is a tick the next thing to happen?"""
         return all_of(self.start.begun, self.outcomes.idle)
 
-    def leaf(self, node: ActionNode | ConditionNode) -> dict[str, Expression]:
-        """Where the leaf succeeds, fails, and, in an action, starts; elsewhere it is running."""
+    def leaf(self, node: ActionNode | ConditionNode, anew: _Tries | None = None) -> dict[str, Expression]:
+        """Where the leaf succeeds, fails, and, in an action, starts; elsewhere it is running. ``anew`` is the
+        outermost node of which an attempt has failed in this tick."""
         cell_of = self.start.cell_of
         if isinstance(node, ConditionNode):
             true, false = where_true(node.condition, cell_of), where_false(node.condition, cell_of)
             return {"success": true, "failure": false, "started": NO}
-        done = Compare(self._done[node.id], "=", 1) if node.latched else NO
+        gone = set() if anew is None else anew.below
+        done: Expression = NO
+        if node.latched and self._done[node.id] not in gone:
+            done = Compare(self._done[node.id], "=", 1)
         true, false = YES, NO
         if node.guarded:
             precondition = self.task.action_by_name[node.action].precondition
             true, false = where_true(precondition, cell_of), where_false(precondition, cell_of)
-        left = all_of(*(Compare(cell, "<", attempts) for cell, attempts in self._attempts[node.id]))
+        left = all_of(
+            *(Compare(cell, "<", attempts) for cell, attempts in self._attempts[node.id] if cell not in gone)
+        )
         refused = any_of(false, all_of(true, none_of(left)))
         return {
             "success": done,
@@ -180,13 +213,24 @@ class _Writer:
             "started": all_of(none_of(done), true, left),
         }
 
-    def starting(self, node: ActionNode, guard: Expression, then: Sequence[Update]) -> None:
+    def starting(
+        self, node: ActionNode, guard: Expression, then: Sequence[Update], anew: _Tries | None = None
+    ) -> None:
         """Write the command that starts the action where ``guard`` holds; ``then`` are updates
         besides those that the start itself makes."""
         action = self.task.action_by_name[node.action]
-        updates: list[Update] = [Increment(cell) for cell, _ in self._attempts[node.id]]
-        if node.latched:
-            updates.append(put(self._done[node.id], 1))
+        gone = set() if anew is None else set(anew.below)
+        for each in self._tries.values():  # what this start halts, or has ended before it
+            if node.id not in each.actions:
+                gone |= {each.failed, *each.below}
+        made = [cell for cell, _ in self._attempts[node.id]]
+        done = {self._done[node.id]} if node.latched else set()
+        updates: list[Update] = [Increment(cell) for cell in made if cell not in gone]
+        updates += [put(cell, 1) for cell in made if cell in gone]
+        updates += [put(cell, 1) for cell in done]
+        updates += [put(cell, 0) for cell in sorted(gone - done - set(made))]
+        if anew is not None:
+            updates.append(Increment(anew.failed))
         branches = self.outcomes.branches(action, [*updates, *then])
         self.commands.append(Command(node.action, guard, branches, f"node {node.id}"))
         ready = where_true(action.precondition, self.start.cell_of)
@@ -202,7 +246,7 @@ class _Writer:
 
 @dataclass(slots=True)
 class _Guards(_Writer):
-    _known: dict[tuple[str, Returned], Expression] = field(default_factory=dict)
+    _known: dict[tuple[str, Returned, int], Expression] = field(default_factory=dict)
     _guards: list[Expression] = field(default_factory=list)
 
     def write(self) -> None:
@@ -212,67 +256,92 @@ class _Guards(_Writer):
         for end, holds in (("success", success), ("failure", failure), ("blocked", blocked)):
             self.ends[end] = self.draft.define("", end, all_of(self.between, holds))
 
-    def returns(self, node: Node, status: Returned) -> Expression:
+    def returns(self, node: Node, status: Returned, anew: _Tries | None = None) -> Expression:
         """Where a tick of the node returns the status; one that starts an action is running."""
-        key = (node.id, status)
+        key = (node.id, status, 0 if anew is None else anew.number)
         if key not in self._known:
-            self._known[key] = self.draft.define(node.id, status, self._returns(node, status))
+            found = self._returns(node, status, anew)
+            self._known[key] = self.draft.define(node.id, _aspect(status, anew), found)
         return self._known[key]
 
-    def _returns(self, node: Node, status: Returned) -> Expression:
+    def _returns(self, node: Node, status: Returned, anew: _Tries | None) -> Expression:
         match node:
             case ConditionNode() | ActionNode():
                 if status == "running":
-                    return none_of(self.returns(node, "success"), self.returns(node, "failure"))
-                return self.leaf(node)[status]
+                    return none_of(self.returns(node, "success", anew), self.returns(node, "failure", anew))
+                return self.leaf(node, anew)[status]
             case ControlNode(kind="retry"):
-                (child,) = node.children
-                return self.returns(child, status)
+                return self.returns(node.children[0], status, anew)
+            case ControlNode(kind="retry-until-success"):
+                return self._tried(node, status, anew)
             case ControlNode():
                 go_on = _GO_ON[node.kind]
                 if status == go_on:
-                    return all_of(*(self.returns(child, go_on) for child in node.children))
+                    return all_of(*(self.returns(child, go_on, anew) for child in node.children))
                 if len(node.children) > _WIDE:
-                    return self._first(node, status)
+                    return self._first(node, status, anew)
                 found: Expression = NO
                 for child in reversed(node.children):
-                    later = NO if found == NO else all_of(self.returns(child, go_on), found)
-                    found = any_of(self.returns(child, status), later)
+                    later = NO if found == NO else all_of(self.returns(child, go_on, anew), found)
+                    found = any_of(self.returns(child, status, anew), later)
                 return found
             case _:
                 assert_never(node)
 
-    def _first(self, node: ControlNode, status: Returned) -> Expression:
+    def _tried(self, node: ControlNode, status: Returned, anew: _Tries | None) -> Expression:
+        """An attempt that fails in the tick that it begins in would fail again: no other one is made then."""
+        (child,) = node.children
+        first, tries = self.returns(child, status, anew), self._tries[node.id]
+        if anew is not None or tries.left == NO:
+            return first
+        again = self.returns(child, status, tries)
+        if status == "failure":
+            return all_of(first, any_of(none_of(tries.left), again))
+        return any_of(first, all_of(self.returns(child, "failure"), tries.left, again))
+
+    def _first(self, node: ControlNode, status: Returned, anew: _Tries | None) -> Expression:
         """Some child returns the status, and all before it let the tick go on."""
         passed: Expression = YES
         cases = []
         for number, child in enumerate(node.children):
             if number:
-                before = self.returns(node.children[number - 1], _GO_ON[node.kind])
-                passed = self.draft.define(node.id, f"passes_{number}", all_of(passed, before))
-            cases.append(all_of(passed, self.returns(child, status)))
+                before = self.returns(node.children[number - 1], _GO_ON[node.kind], anew)
+                aspect = _aspect(f"passes_{number}", anew)
+                passed = self.draft.define(node.id, aspect, all_of(passed, before))
+            cases.append(all_of(passed, self.returns(child, status, anew)))
         return any_of(*cases)
 
-    def _tick(self, node: Node, comes: Expression) -> None:
+    def _tick(self, node: Node, comes: Expression, anew: _Tries | None = None) -> None:
         """Write the commands of the action nodes below, which a tick comes to where ``comes``."""
         match node:
             case ConditionNode():
                 pass
             case ActionNode():
-                guard = self.draft.define(node.id, "starts", all_of(comes, self.leaf(node)["started"]))
+                starts = all_of(comes, self.leaf(node, anew)["started"])
+                guard = self.draft.define(node.id, _aspect("starts", anew), starts)
                 if guard != NO:
                     self._guards.append(guard)
-                    self.starting(node, guard, [])
+                    self.starting(node, guard, [], anew)
+            case ControlNode(kind="retry-until-success"):
+                (child,) = node.children
+                self._tick(child, comes, anew)
+                tries = self._tries[node.id]
+                if anew is None and tries.left != NO and tries.actions:
+                    self._tick(child, all_of(comes, self.returns(child, "failure"), tries.left), tries)
             case ControlNode():
                 for child in node.children:
                     if next(actions_of(child), None) is not None:
                         if isinstance(child, ControlNode):
-                            comes = self.draft.define(child.id, "ticked", comes)
-                        self._tick(child, comes)
+                            comes = self.draft.define(child.id, _aspect("ticked", anew), comes)
+                        self._tick(child, comes, anew)
                     if child is not node.children[-1]:
-                        comes = all_of(comes, self.returns(child, _GO_ON[node.kind]))
+                        comes = all_of(comes, self.returns(child, _GO_ON[node.kind], anew))
             case _:
                 assert_never(node)
+
+
+def _aspect(what: str, anew: _Tries | None) -> str:
+    return what if anew is None else f"{what}_anew_{anew.number}"
 
 
 # --- walk ------------------------------------------------------------------------------------
@@ -283,6 +352,8 @@ class _Walk(_Writer):
     _at: int = 0
     _leaves: dict[str, int] = field(default_factory=dict)
     _next: dict[str, dict[Returned, int]] = field(default_factory=dict)
+    _again: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """By retry-until-success node, where an attempt begins, and where a tick goes on after the last one."""
 
     def write(self) -> None:
         leaves = [node for node in walk(self.root) if not isinstance(node, ControlNode)]
@@ -290,11 +361,16 @@ class _Walk(_Writer):
         ends = {end: len(leaves) + number for number, end in enumerate(("success", "failure", "blocked"))}
         first = self._entry(self.root, ends["success"], ends["failure"], ends["blocked"])
         meaning = "the leaf being ticked, from the left; then success, failure, blocked"
-        self._at = self.draft.cell(Cell("control", "at", meaning, len(leaves) + 2, first))
+        if self._tries:
+            meaning += ", failed attempts"
+        highest = len(leaves) + 2 + len(self._tries)
+        self._at = self.draft.cell(Cell("control", "at", meaning, highest, first))
         for end, place in ends.items():
             self.ends[end] = all_of(self.start.begun, Compare(self._at, "=", place))
         for leaf in leaves:
             self._leaf(leaf, first)
+        for node, (entry, failure) in self._again.items():
+            self._failed(node, entry, failure)
 
     def _entry(self, node: Node, success: int, failure: int, running: int) -> int:
         """Where a tick of the node begins, given where it goes on after each status."""
@@ -303,8 +379,11 @@ class _Walk(_Writer):
                 self._next[node.id] = {"success": success, "failure": failure, "running": running}
                 return self._leaves[node.id]
             case ControlNode(kind="retry"):
-                (child,) = node.children
-                return self._entry(child, success, failure, running)
+                return self._entry(node.children[0], success, failure, running)
+            case ControlNode(kind="retry-until-success"):
+                entry = self._entry(node.children[0], success, self._place(node.id), running)
+                self._again[node.id] = entry, failure
+                return entry
             case ControlNode():
                 after = {"success": success, "failure": failure, "running": running}
                 go_on = _GO_ON[node.kind]
@@ -313,6 +392,21 @@ class _Walk(_Writer):
                 return after[go_on]
             case _:
                 assert_never(node)
+
+    def _place(self, node: str) -> int:
+        """Where a tick is after an attempt of a node has failed."""
+        return len(self._leaves) + 2 + self._tries[node].number
+
+    def _failed(self, node: str, entry: int, failure: int) -> None:
+        tries = self._tries[node]
+        here = all_of(self.between, Compare(self._at, "=", self._place(node)))
+        anew: list[Update] = [put(self._at, entry), Increment(tries.failed)]
+        anew += [put(cell, 0) for cell in sorted(tries.below)]
+        ends: list[Update] = [put(self._at, failure)]
+        for holds, updates in ((tries.left, anew), (none_of(tries.left), ends)):
+            if holds != NO:
+                branch = Branch(_ONE, tuple(updates), (_ZERO, _ZERO, _ZERO))
+                self.commands.append(Command(None, all_of(here, holds), (branch,), f"node {node}"))
 
     def _leaf(self, node: ActionNode | ConditionNode, first: int) -> None:
         here = all_of(self.between, Compare(self._at, "=", self._leaves[node.id]))

@@ -20,6 +20,7 @@ from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import TRUE, And, Condition, Is, Known, Not, Or
 from bbtc.ground.task import GroundAction, InitialState, Task, Variable
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.replay.engines import BtcppReplay, PyTreesReplay
 from bbtc.replay.script import TIMINGS, Run, Script
 from bbtc.source import SourceFile
@@ -370,14 +371,20 @@ def test_a_condition_too_deep_to_write_is_an_error() -> None:
     assert error.value.diagnostics[0].code == "BBT0705"
 
 
-def test_the_deepest_condition_that_is_taken_keeps_its_value() -> None:
+@pytest.mark.parametrize("around", [0, 9, 119, 120, DEEPEST_TREE - 1])
+def test_the_deepest_condition_that_is_taken_keeps_its_value(around: int) -> None:
     pytest.importorskip("behaviortreepy", reason="no wheel of behaviortreepy for this platform")
     condition: Condition = Is(0, Truth.TRUE)
     for level in range(DEEPEST_CONDITION - 1):
         part = Is(1, Truth.TRUE if level % 3 else Truth.FALSE)
         condition = Or((part, condition)) if level % 2 else And((part, condition))
     variables = Variable("p", (), True), Variable("q", (), True)
-    tree = tree_of(ConditionNode("n1", condition), *variables)
+    root: Node = ConditionNode("n1", condition)
+    for level in range(around):
+        kind: ControlKind = "fallback" if level % 2 else "sequence"
+        root = ControlNode(f"around{level}", kind, (root,))
+    tree = tree_of(root, *variables)
+    assert Limits().depth <= DEEPEST_CONDITION
     for replay in (BtcppReplay(tree), PyTreesReplay(tree)):
         for values in ((p, q) for p in range(3) for q in range(3)):
             expected = "success" if value_of(condition, values) == "T" else "failure"

@@ -259,3 +259,25 @@ def test_yaml_refuses_what_is_too_deep_for_its_library() -> None:
         root = ControlNode(f"deep{level}", "sequence", (root,))
     with pytest.raises(BbtcError, match="BBT0705"):
         export(replace(tree, root=root), "yaml")
+
+
+# --- nodes that count attempts -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("form", "retry", "until"),
+    [
+        ("text", "↻ at most 3", "↺ 3 attempts"),
+        ("dot", "↻\\nat most 3", "↺\\n3 attempts"),
+        ("mermaid", "↻<br>at most 3", "↺<br>3 attempts"),
+        ("svg", "retry, at most 3 actions", "retry-until-success, 3 attempts"),
+    ],
+)
+def test_pictures_tell_attempts_of_a_child_from_starts_of_actions(form: str, retry: str, until: str) -> None:
+    """Both count up to three, but not the same."""
+    tree = small()
+    for kind, shown in (("retry", retry), ("retry-until-success", until)):
+        root = ControlNode("again", kind, (tree.root,), attempts=3)  # type: ignore[arg-type]
+        text = export(replace(tree, root=root), form, {"layout": "bbtc"} if form == "svg" else {})
+        assert shown in text
+    assert export(replace(tree, root=root), "text", {"style": "ascii"}).startswith("@@ 3 attempts")

@@ -16,7 +16,8 @@ from bbtc.tree.nodes import Node
 from tests.replay.reference import Ticking, value_of
 
 State = tuple[int, ...]
-Key = tuple[State, tuple[str, ...], tuple[tuple[str, int], ...]]
+Counts = tuple[tuple[str, int], ...]
+Key = tuple[State, tuple[str, ...], Counts, Counts]
 """Values, finished latches, and attempts made."""
 After = list[tuple[float, float, Key]]
 """Chances, costs, and where they lead."""
@@ -108,16 +109,16 @@ class Exact:
         or from the initial belief."""
         belief: dict[Key, float] = {}
         for initial in self.task.initial:
-            key: Key = (tuple(map(int, initial.values)) if start is None else start, (), ())
+            key: Key = (tuple(map(int, initial.values)) if start is None else start, (), (), ())
             belief[key] = belief.get(key, 0.0) + float(initial.probability)
         found = dict.fromkeys(("success", "missed", "failure", "blocked", "starts", "unready", "cost"), 0.0)
         self.stops: dict[State, float] = {}
         for _ in range(ticks):
             changed: dict[Key, float] = {}
-            for (state, finished, tries), p in belief.items():
+            for (state, *memory), p in belief.items():
                 ways = [(float(q), after) for q, after in self.changes(state)] or [(1.0, state)]
                 for q, after in [(1 - self.rate, state), *((self.rate * q, after) for q, after in ways)]:
-                    key = (after, finished, tries)
+                    key = (after, *memory)  # type: ignore[assignment]
                     changed[key] = changed.get(key, 0.0) + p * q
             belief = {}
             for key, p in changed.items():
@@ -137,16 +138,17 @@ class Exact:
     def _ticked(self, key: Key) -> tuple[str, After]:
         if key in self._seen:
             return self._seen[key]
-        state, finished, tries = key
-        run = Ticking(self.task, state, set(finished), dict(tries))
-        status = run.tick(self.root)
+        state, finished, tries, lost = key
+        run = Ticking(self.task, state, set(finished), dict(tries), lost=dict(lost))
+        status = run.tick_all(self.root)
         after: After = []
         if run.started is None:
             goal = value_of(self.task.goal, state) == "T"
             kind = {"success": "success" if goal else "missed", "running": "blocked"}.get(status, "failure")
         else:
             latched = {run.started.id} if run.started.latched else set()
-            memory = tuple(sorted(run.finished | latched)), tuple(sorted(run.tries.items()))
+            counts = tuple(sorted(run.tries.items())), tuple(sorted(run.lost.items()))
+            memory = tuple(sorted(run.finished | latched)), *counts
             action = self.task.action_by_name[run.started.action]
             kind = "ready" if value_of(action.precondition, state) == "T" else "unready"
             if kind == "ready":

@@ -24,7 +24,7 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 from tests.cli.program import bbtc as program
 from tests.disturbance.reference import Changes, Exact, State
 from tests.long_form import amount
-from tests.replay.random_trees import random_tree
+from tests.replay.random_trees import random_tree, with_attempts
 
 DOMAINS = Path(__file__).parents[2] / "domains"
 TWENTIETH = Fraction(1, 20)
@@ -88,6 +88,7 @@ def test_sampled_figures_of_random_trees_are_those_of_the_exact_chain() -> None:
     for seed in range(amount(40, 600)):
         rng = Random(seed)
         tree = random_tree(seed, guarded=0.1)
+        tree = tree if seed % 4 else with_attempts(tree, seed)
         rate = rng.choice([Fraction(0), Fraction(1, 7), Fraction(1)])
         found = compare(tree.task, tree.root, rate, 400, seed)
         for kind in seen:

@@ -30,8 +30,9 @@ class Totals:
     """Probability of the runs that were cut."""
 
 
-_Run = tuple[Values, frozenset[str], tuple[tuple[str, int], ...]]
-"""The values, the latches, and the tries of each retry node."""
+_Count = tuple[tuple[str, int], ...]
+_Run = tuple[Values, frozenset[str], _Count, _Count]
+"""The values, the latches, the tries of each retry node, and the failed ones of each retry-until-success."""
 
 
 def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> Totals:
@@ -39,7 +40,7 @@ def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> 
     totals = Totals()
     runs: dict[_Run, Fraction] = {}
     for state in task.initial:
-        key: _Run = (tuple(int(value) for value in state.values), frozenset(), ())
+        key: _Run = (tuple(int(value) for value in state.values), frozenset(), (), ())
         runs[key] = runs.get(key, Fraction(0)) + state.probability
     while runs:
         totals.open = sum(runs.values(), Fraction(0))
@@ -47,14 +48,14 @@ def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> 
             break
         totals.open = Fraction(0)
         following: dict[_Run, Fraction] = {}
-        for (values, finished, tries), probability in runs.items():
-            run = Ticking(task, values, set(finished), dict(tries))
-            status = run.tick(root)
+        for (values, finished, tries, lost), probability in runs.items():
+            run = Ticking(task, values, set(finished), dict(tries), lost=dict(lost))
+            status = run.tick_all(root)
             node = run.started
             if node is None:
                 totals.ends[status] += probability
                 continue
-            latches = finished | {node.id} if node.latched else finished
+            latches = frozenset(run.finished | ({node.id} if node.latched else set()))
             action = task.action_by_name[node.action]
             assert value_of(action.precondition, values) == "T", "started without its precondition"
             totals.actions += probability
@@ -62,7 +63,8 @@ def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> 
                 share = probability * chance
                 totals.cost += share * (action.cost + cost)
                 totals.reward += share * reward
-                key = (_changed(values, sets), latches, tuple(sorted(run.tries.items())))
+                tried, failed = (tuple(sorted(each.items())) for each in (run.tries, run.lost))
+                key = (_changed(values, sets), latches, tried, failed)
                 following[key] = following.get(key, Fraction(0)) + share
         runs = following
     return totals
@@ -84,8 +86,7 @@ def runs_of(task: Task, root: Node, most: int) -> dict[History, Fraction]:
         history, run, probability = waiting.pop()
         if not probability:
             continue
-        run.started = None
-        status = run.tick(root)
+        status = run.tick_all(root)
         node = run.started_now()
         if node is None or len(history) > 2 * most:
             end = (*history, status) if node is None else history
@@ -97,7 +98,7 @@ def runs_of(task: Task, root: Node, most: int) -> dict[History, Fraction]:
             after = _changed(run.values, sets)
             results[after] = results.get(after, Fraction(0)) + chance
         for after, chance in results.items():
-            following = Ticking(task, after, set(finished), dict(run.tries))
+            following = Ticking(task, after, set(finished), dict(run.tries), lost=dict(run.lost))
             waiting.append(((*history, node.action, after), following, probability * chance))
     return found
 

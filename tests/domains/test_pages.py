@@ -24,7 +24,7 @@ from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc,
 
 PAGES = REPOSITORY / "docs" / "domains"
 MADE = re.compile(r"(?<=<!-- )(?!end )(\w+)(?:: ([\w/-]+))? -->\n.*?(?=<!-- end -->)", re.DOTALL)
-SIGNS = {"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻"}
+SIGNS = {"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻", "retry-until-success": "↺"}
 
 
 def outline(task: Task, node: Node, depth: int = 0) -> str:

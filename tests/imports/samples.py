@@ -95,10 +95,14 @@ def idioms_tree() -> Tree:
         check(Or((lit, cup)), "either"),
     )
     again = control("sequence", act("look(cup)", False), check(Known(1)))
+    once = ControlNode(f"n{next(number)}", "retry", (act("switch-on()", False),), attempts=1)
+    tried = control("sequence", act("go(7)", True, True), check(near), once)
+    until = ControlNode(f"n{next(number)}", "retry-until-success", (tried,), "go there", attempts=3)
     root = control(
         "fallback",
         control("skipper", check(can), control("sequence", light, walk, look)),
         control("sequence", conditions, shelf),
+        until,
         again,
     )
     return Tree(task, root, Fraction(1, 8), Fraction(1, 4), "stuck")

@@ -12,6 +12,7 @@ from tests.imports.samples import check_in_engine, exported, idioms_tree, read, 
 
 TREE = idioms_tree()
 STOCK, OURS = exported(TREE, "stock"), exported(TREE, "bbtc")
+STATE, RETRY = "@find_can_attempt_1", 'RetryUntilSuccessful num_attempts="3"'
 UNKNOWN_FIRST = '<ReactiveSequence><Seen item="can"/><Seen item="cup"/></ReactiveSequence>'
 MINIMUM = '<Parallel success_count="2" failure_count="1"><Seen item="can"/><Lit/></Parallel>'
 
@@ -63,6 +64,16 @@ def before_end(text: str, added: str) -> str:
         (STOCK.replace("attempts_left_1 &gt; 0", "attempts_left_1 &gt; 1", 1), "'code'"),
         (STOCK.replace("@find_can_attempts_left_1", "left"), "'code'"),
         (before_end(STOCK, block(STOCK, "ReactiveSequence", "<RunOnce")), "two retry nodes"),
+        (before_end(STOCK, block(STOCK, "ReactiveSequence", f'code="{STATE} := ')), "two nodes tell by"),
+        (before_end(STOCK, f"<{RETRY}><Lit/></RetryUntilSuccessful>"), "no counterpart"),
+        (STOCK.replace(f"{STATE} == 'new'", f"{STATE} == 'begun'"), "'code'"),
+        (STOCK.replace(f"{STATE} != 'hopeless'", "@other != 'hopeless'"), "'code'"),
+        (STOCK.replace('num_attempts="3"', 'num_attempts="-1"'), "'num_attempts'"),
+        (STOCK.replace(f"; {STATE} := 'new'", "", 1), "'_onFailure' must make everything below"),
+        (STOCK.replace("@find_can_latch_1 := 'none'; ", ""), "must make everything below forget"),
+        (STOCK.replace("left_2 := 1; @find", "left_2 := 9; @find"), "must make everything below"),
+        (STOCK.replace("@find_can_latch_1", "_latch"), "keeps its status for good"),
+        (STOCK.replace("_latch := ", "@kept := ").replace("{_latch}", "{@kept}"), "which nothing sets back"),
         (before_end(OURS, block(OURS, "ReactiveSequence", "<RunOnce")), "two retry nodes"),
     ],
 )  # fmt: skip

@@ -51,7 +51,7 @@ def keeps_to_its_conditions(task: Task, root: Node, states: Iterable[Sequence[in
     for values in states:
         for remembered in most:
             status = tick(values, remembered)
-            wanted = needed[status - STARTED] if status >= STARTED else task.goal
+            wanted = needed[memory.action(status)] if status >= STARTED else task.goal
             if (
                 status != NodeStatus.FAILURE
                 and status != NodeStatus.RUNNING

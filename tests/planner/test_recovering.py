@@ -3,6 +3,7 @@ are those of the cheapest among the best policies, beside value iteration, an in
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -14,7 +15,7 @@ from bbtc.belief.simulate import figures
 from bbtc.diagnostics import LimitReached
 from bbtc.disturbance.perturbed import perturbed_runs
 from bbtc.disturbance.recovery import recovery
-from bbtc.ground.condition import FALSE, Is
+from bbtc.ground.condition import FALSE, Is, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -95,6 +96,27 @@ def test_rules_need_no_test_where_the_guards_of_their_actions_tell() -> None:
     found = [rule for rule in root.children if isinstance(rule, ActionNode) and rule.guarded]
     assert {rule.action for rule in found} == {"first()", "second()"}
     assert len(root.children) == 1 + len(found)
+
+
+def test_rules_that_are_fine_alone_do_not_lead_in_circles() -> None:
+    """From three places one may cross a river or walk round it, and across it go back or wade on. To cross is
+    nearly as good as to walk, and to go back nearly as good as to wade on; but both together never end."""
+    places = (2, 3, 4)
+    gone: dict[int, Truth] = dict.fromkeys(places, F)
+    here = Or(tuple(Is(place, T) for place in places))
+    slips = [action(f"slip{place}", Is(0, T), ("1", {0: F, place: T})) for place in places]
+    cross = action("cross", here, ("1", {**gone, 5: T}))
+    back = action("back", Is(5, T), ("1", {5: F, 2: T}))
+    around = replace(action("walk", here, ("1", {**gone, 1: T})), cost=Fraction(3))
+    wade = replace(action("wade", Is(5, T), ("1", {5: F, 1: T})), cost=Fraction(17, 5))
+    go = action("go", Is(0, T), ("1", {0: F, 1: T}))
+    of = task("start done a b c over", {0: T}, Is(1, T), cross, back, around, wade, go, *slips)
+    root = recovering_tree(of, Limits())
+    assert root is not None
+    states = reachable(of)
+    assert states is not None
+    exact = Exact(of, root.root, 0.0, lambda state: [])
+    assert {exact.chances(100, state)["success"] for state in states} == {1}
 
 
 def test_where_only_others_can_help_it_tries_again() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -15,9 +16,19 @@ from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import plan_task, simulate_tree
+from bbtc.replay.equivalence import ENGINES, difference, engine_missing
 from bbtc.rewrite.repeat import with_repeats
 from bbtc.rewrite.simplify import numbered, size
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, retries_of
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlNode,
+    Node,
+    Tree,
+    actions_of,
+    retries_of,
+    retries_until_success_of,
+)
 from bbtc.tree.validate import check_tree
 from bbtc.verifier.verdict import verify
 from tests.domains.brute_force import runs_of
@@ -114,3 +125,19 @@ def test_what_refinement_repeats_is_put_together_where_its_advice_is_taken(name:
     ours, theirs = (simulate_tree(each, Limits())[0] for each in (tree, published))
     assert (ours.success, ours.cost, ours.actions) == (theirs.success, theirs.cost, theirs.actions)
     assert verify(tree, Limits(), "own").problems == ()
+
+
+def test_attempts_of_several_actions_are_one_and_run_as_before_in_both_engines() -> None:
+    """Refinement inserts the template "find" twice, which looks at one table after the other."""
+    (problem,) = (each for each in PROBLEMS if str(each) == "household/look-for-soda")
+    refined = plan_of(problem, "refine").tree
+    root = repeats(refined.task, refined.root)
+    ((again, attempts),) = retries_until_success_of(root)
+    assert attempts == 2
+    assert len(list(actions_of(again))) > 1
+    assert (size(refined.root), size(root)) == (37, 25)
+    tree = replace(refined, root=root)
+    assert verify(tree, Limits(), "own").problems == ()
+    for form in ENGINES:
+        if engine_missing(form) is None:
+            assert difference(tree, form, Limits()) is None

@@ -17,6 +17,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.synthesis.permissive import MultiPolicy
 from bbtc.planner.synthesis.tree import in_phases, synthesize
+from bbtc.rewrite.repeat import with_repeats
 from bbtc.rewrite.retry import with_least_attempts
 from bbtc.rewrite.shrink import shrunk
 from bbtc.rewrite.simplify import numbered, simplified, without_idle_branches
@@ -45,19 +46,22 @@ _KINDS: dict[str, ControlKind] = {"sequence": "sequence", "fallback": "fallback"
 
 
 def tree_of(text: str) -> Node:
-    """``fallback(won, retry2(try!), known:a, a?, not:c)``: tests by the name of what they are about, actions
-    with a mark."""
+    """``fallback(won, retry2(try!), until2(try!!), known:a, a?, not:c)``: tests by the name of what they are
+    about, actions with a mark, latched ones with two."""
     words = re.findall(r"[\w:?!]+|[()]", text)
 
     def node() -> Node:
         word = words.pop(0)
         if words[:1] != ["("]:
-            return ActionNode("", word[:-1] + "()", latched=False) if word[-1] == "!" else test(word)
+            latched = word.endswith("!!")
+            return ActionNode("", word.rstrip("!") + "()", latched) if word[-1] == "!" else test(word)
         words.pop(0)
         children = []
         while words[0] != ")":
             children.append(node())
         words.pop(0)
+        if word.startswith("until"):
+            return ControlNode("", "retry-until-success", tuple(children), attempts=int(word[5:]))
         if word.startswith("retry"):
             return ControlNode("", "retry", tuple(children), attempts=int(word[5:]))
         return ControlNode("", _KINDS[word], tuple(children))
@@ -72,13 +76,14 @@ def tree_of(text: str) -> Node:
 
 def text_of(node: Node) -> str:
     match node:
-        case ActionNode(action=name):
-            return name.removesuffix("()") + "!"
+        case ActionNode(action=name, latched=latched):
+            return name.removesuffix("()") + ("!!" if latched else "!")
         case ConditionNode(condition=condition):
             return condition_text(condition)
         case _:
             children = ", ".join(map(text_of, node.children))
-            return f"{node.kind}{node.attempts or ''}({children})"
+            word = "until" if node.kind == "retry-until-success" else node.kind
+            return f"{word}{node.attempts or ''}({children})"
 
 
 def condition_text(condition: Condition) -> str:
@@ -172,6 +177,32 @@ def test_alternatives_that_a_target_does_not_take(rule: int, target: str, before
 def test_attempts(rule: int, target: str, before: str, after: str) -> None:
     del rule
     assert text_of(with_least_attempts(TASK, tree_of(before), Fraction(target), Limits())) == after
+
+
+_TWICE = "sequence(try!!, again!!, won)"
+_PAIR = "sequence(try!!, again!!)"
+
+
+@pytest.mark.parametrize(
+    ("rule", "before", "after"),
+    [
+        (1, "fallback(won, sequence(again!!, won), sequence(again!!, won))", "fallback(won, retry2(again!))"),
+        (2, f"fallback(won, {_TWICE}, {_TWICE})", f"fallback(won, until2({_TWICE}))"),
+        (2, f"fallback(won, {_TWICE}, {_TWICE}, {_TWICE}, c)", f"fallback(won, until3({_TWICE}), c)"),
+        # What follows would be given up as soon as it runs: the node begins anew.
+        (2, f"fallback(won, {_TWICE}, {_TWICE}, again!!)", None),
+        (2, f"fallback(won, sequence(fallback({_PAIR}, {_PAIR}), sure!!))", None),
+        # In between the tick leaves the attempt, which would begin anew.
+        (2, f"fallback(won, sequence(c, again!!, won), {_TWICE}, {_TWICE})", None),
+        # Not neighbours.
+        (2, f"fallback(won, {_TWICE}, again!!, {_TWICE})", None),
+    ],
+)
+def test_repeats(rule: int, before: str, after: str | None) -> None:
+    del rule
+    tree = tree_of(before)
+    found = with_repeats(TASK, tree, explore(TASK, tree, Limits()), Limits())
+    assert text_of(found) == (before if after is None else after)
 
 
 def policy_of(text: str, of: Task = TASK) -> MultiPolicy:

@@ -10,7 +10,16 @@ from itertools import count
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Not, Or
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree, actions_of
+from bbtc.tree.nodes import (
+    ActionNode,
+    ConditionNode,
+    ControlKind,
+    ControlNode,
+    Node,
+    Tree,
+    actions_of,
+    retries_until_success_of,
+)
 
 KINDS: tuple[ControlKind, ...] = ("sequence", "fallback", "skipper")
 
@@ -190,3 +199,22 @@ class _Grower:
         action = self.rng.choice(self.task.actions).name
         kept, guarded = self.rng.random() < self.latched, self.rng.random() < self.guarded
         return ActionNode(f"n{next(self.ids)}", action, kept, guarded)
+
+
+def with_attempts(tree: Tree, seed: int) -> Tree:
+    """The tree with retry-until-success nodes around some of its parts, at least one of which acts."""
+    rng = random.Random(seed)
+    ids = count(1)
+
+    def tried(node: Node) -> Node:
+        if isinstance(node, ControlNode):
+            node = replace(node, children=tuple(map(tried, node.children)))
+        if rng.random() < (0.2 if any(actions_of(node)) else 0.03):
+            attempts = rng.choice([1, 2, 2, 3, 3, 4])
+            node = ControlNode(f"u{next(ids)}", "retry-until-success", (node,), attempts=attempts)
+        return node
+
+    while True:
+        root = tried(tree.root)
+        if any(any(actions_of(node)) for node, _ in retries_until_success_of(root)):
+            return replace(tree, root=root)

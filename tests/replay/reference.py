@@ -13,7 +13,7 @@ from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.replay.script import Run, Script, Values
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, walk
 from tests.replay.ticks import Tick, TickScript, TickWorld
 
 AND = {"TT": "T", "TU": "U", "TF": "F", "UT": "U", "UU": "U", "UF": "F", "FT": "F", "FU": "F", "FF": "F"}
@@ -53,6 +53,48 @@ class Ticking:
     tries: dict[str, int] = field(default_factory=dict)
     started: ActionNode | None = None
     around: list[ControlNode] = field(default_factory=list)
+    lost: dict[str, int] = field(default_factory=dict)
+    """The attempts of retry-until-success nodes that have failed."""
+    going: set[str] = field(default_factory=set)
+    """Those of them that are running in this tick."""
+
+    def tick_all(self, root: Node) -> str:
+        """One tick of a tree. What it does not leave running is halted."""
+        self.started = None
+        self.going.clear()
+        status = self.tick(root)
+        self.halt(root)
+        return status
+
+    def halt(self, root: Node) -> None:
+        """Every retry-until-success that is not running begins anew."""
+        for node in walk(root):
+            if node.id in self.lost and node.id not in self.going:
+                self.forget(node)
+
+    def forget(self, node: Node) -> None:
+        """Nothing is remembered of a node and of what is below it."""
+        for each in walk(node):
+            self.finished.discard(each.id)
+            self.tries.pop(each.id, None)
+            self.lost.pop(each.id, None)
+
+    def until_success(self, node: ControlNode) -> str:
+        """The status of the child, which is tried again where it fails."""
+        (child,) = node.children
+        assert node.attempts is not None
+        while True:
+            self.lost.setdefault(node.id, 0)
+            status = self.tick(child)
+            if status == "running":
+                self.going.add(node.id)
+                return status
+            if status == "failure" and self.lost[node.id] + 1 < node.attempts:
+                self.lost[node.id] += 1
+                self.forget(child)
+                continue
+            self.forget(node)
+            return status
 
     def tick(self, node: Node) -> str:
         """The status a node returns; :attr:`started` is the action it started."""
@@ -66,6 +108,8 @@ class Ticking:
             status = self.tick(node.children[0])
             self.around.pop()
             return status
+        if node.kind == "retry-until-success":
+            return self.until_success(node)
         for child in node.children:
             status = self.tick(child)
             if status != GOES_ON[node.kind]:
@@ -128,12 +172,21 @@ class Running(Ticking):
                 self.finished.add(self.runs.id)
             self.runs = None
 
+    def forget(self, node: Node) -> None:
+        below = {each.id for each in walk(node)}
+        if self.runs is not None and self.runs.id in below:
+            self.world.cancel(self.runs.id)
+            self.runs = None
+        self.failed -= below
+        super().forget(node)
+
     def tick_root(self, root: Node) -> str:
         """One tick. What it does not call is cancelled; where nothing is called, nothing runs."""
-        self.values, self.started, self.called = self.world.values, None, False
-        status = self.tick(root)
+        self.values, self.called = self.world.values, False
+        status = self.tick_all(root)
         if not self.called:
             self._cancel()
+            self.halt(root)
         return "failure" if status == "running" and not self.called else status
 
     def trace(self, root: Node, script: TickScript) -> list[Tick]:
@@ -146,6 +199,8 @@ class Running(Ticking):
                 break
             if number in script.halts:
                 self._cancel()
+                self.going.clear()
+                self.halt(root)
         return self.world.ticks
 
 
@@ -159,8 +214,7 @@ def expected_run(task: Task, root: Node, script: Script) -> Run:
     run = Ticking(task, script.initial)
     names: list[str] = []
     for step in range(len(script.steps) + 1):
-        run.started = None
-        status = run.tick(root)
+        status = run.tick_all(root)
         started = run.started_now()
         if started is None:
             return Run(tuple(names), "success" if status == "success" else "failure", run.values)
@@ -190,8 +244,7 @@ def random_run(task: Task, root: Node, rng: random.Random, most: int) -> tuple[S
     run.values = initial = _lively_values(run, root, rng)
     steps: list[tuple[str, Values]] = []
     while True:
-        run.started = None
-        status = run.tick(root)
+        status = run.tick_all(root)
         names = tuple(name for name, _ in steps)
         started = run.started_now()
         if started is None:
@@ -210,8 +263,8 @@ def _lively_values(run: Ticking, root: Node, rng: random.Random) -> Values:
     # Random outcomes end a tree soon: of a few, take one that keeps it going, most of the time.
     for _ in range(rng.choice([1, 6, 6, 6])):
         values = _random_values(run.task, rng, run.values)
-        ahead = Ticking(run.task, values, run.finished, dict(run.tries))
-        ahead.tick(root)
+        ahead = Ticking(run.task, values, set(run.finished), dict(run.tries), lost=dict(run.lost))
+        ahead.tick_all(root)
         if ahead.started is not None:
             break
     return values

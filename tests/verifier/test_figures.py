@@ -28,7 +28,7 @@ from tests.conftest import GOLDEN
 from tests.long_form import amount
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
-from tests.replay.random_trees import random_tree
+from tests.replay.random_trees import random_tree, with_attempts
 from tests.strategies import soda_tree, trees
 
 SAME = (
@@ -66,6 +66,15 @@ def disagreements(tree: Tree, found: Recomputed) -> dict[str, tuple[Fraction | N
 def test_random_trees_full_of_actions(first: int) -> None:
     for seed in range(first, first + 50):
         tree = random_tree(seed, latched=0.85 if seed % 2 else 0.5)
+        for form, most in FORMS:
+            found = solved(chain_of(tree.task, tree.root, form, most))
+            assert disagreements(tree, found) == {}, (seed, form, most)
+
+
+@pytest.mark.parametrize("first", range(0, amount(150, 3000), 50))
+def test_random_trees_that_try_again(first: int) -> None:
+    for seed in range(first, first + 50):
+        tree = with_attempts(random_tree(seed, latched=0.85 if seed % 2 else 0.5), seed)
         for form, most in FORMS:
             found = solved(chain_of(tree.task, tree.root, form, most))
             assert disagreements(tree, found) == {}, (seed, form, most)

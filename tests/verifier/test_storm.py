@@ -30,7 +30,7 @@ from bbtc.verifier.verdict import TOLERANCE, verify
 from tests.long_form import amount
 from tests.planner.examples import Optimum, cases
 from tests.profiles import examples
-from tests.replay.random_trees import random_tree
+from tests.replay.random_trees import random_tree, with_attempts
 from tests.strategies import HOSTILE_NAMES, soda_tree, tasks, trees
 from tests.verifier.optimum import best_probability
 from tests.verifier.test_figures import FORMS
@@ -74,6 +74,13 @@ def test_random_trees_full_of_actions(first: int) -> None:
         form, most = FORMS[seed % len(FORMS)]
         program = chain_of(tree.task, tree.root, form, most)
         assert ask(prism_text(program, numbered(program)), TREE) == expected(tree), (seed, form, most)
+
+
+def test_random_trees_that_try_again() -> None:
+    for seed in range(amount(20, 500)):
+        tree = with_attempts(random_tree(seed, latched=0.7), seed)
+        for form in ("auto", "walk"):
+            assert ask(prism.export(tree, {"form": form}, None), TREE) == expected(tree), (seed, form)
 
 
 @examples(amount(40, 1000))

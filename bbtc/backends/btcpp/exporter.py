@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Comment, Element, SubElement, tostring
 from typing_extensions import assert_never
 
 from bbtc.backends.btcpp.conditions import ConditionWriter
-from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile
+from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile, forgotten, full_again
 from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
 from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE, condition_below, notes, template_label
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
@@ -68,8 +68,8 @@ btcpp = BtcppExporter()
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where in a BehaviorTree the writer is: how deep, below which retry nodes, and which objects are
-    ports there."""
+    """Where in a BehaviorTree the writer is: how deep, below which retry nodes, which objects are ports
+    there, and, for each retry-until-success node around, the scripts that make what is below it forget."""
 
     tree_title: str
     level: int = 0
@@ -77,6 +77,7 @@ class _Place:
     binding: Mapping[str, str] = field(default_factory=dict)
     labels: Labels = field(default_factory=Labels)
     template: Node | None = None
+    forget: tuple[list[str], ...] = ()
 
     def down(self) -> _Place:
         """One level further down."""
@@ -110,6 +111,8 @@ class _Writer:
         self.action_trees: dict[tuple[str, bytes], Element] = {}
         self.subtree_ports: dict[str, tuple[str, ...]] = {}
         self.counters: Iterator[int] = itertools.count(1)
+        self.latches: Iterator[int] = itertools.count(1)
+        self.attempts: Iterator[int] = itertools.count(1)
         self.conditions = ConditionWriter(self.task, self.names, self.tree_ids, self.idioms)
 
     def document(self, model: bool, with_notes: bool) -> Element:
@@ -156,8 +159,18 @@ class _Writer:
         return element
 
     def _control(self, node: ControlNode, place: _Place) -> Deep[Element]:
+        if node.kind == "retry-until-success" and node.attempts is not None:
+            state, scripts = self.idioms.attempt_state(next(self.attempts)), list[str]()
+            inside = replace(place, level=place.level + 4, forget=(*place.forget, scripts))
+            tried: Element = yield self._written(node.children[0], inside)
+            element = self.idioms.retry_until_success(state, node.attempts, tried, scripts)
+            if node.name:
+                element.set("name", shown(node.name))
+            return element
         if node.attempts is not None:
             counter = self.idioms.counter(next(self.counters))
+            for scripts in place.forget:
+                scripts.append(full_again(counter, node.attempts))
             inside = replace(place.down(), counters=(*place.counters, counter))
             child: Element = yield self._written(node.children[0], inside)
             element = self.idioms.retry(counter, node.attempts, child)
@@ -193,7 +206,7 @@ class _Writer:
         symbol, args = split_name(template)
         hoisted = _Hoisted(next(self.order), symbol, template, f"{TEMPLATE} {shown(symbol)}")
         binding = self._argument_ports(node, args)
-        inside = _Place(symbol, counters=place.counters, binding=binding, template=node)
+        inside = _Place(symbol, counters=place.counters, binding=binding, template=node, forget=place.forget)
         content: Element = yield self._written(node, inside)
         element = self._call(hoisted, content, tuple(binding.values()))
         element.set("name", place.labels.unique(template_label(template)))
@@ -249,13 +262,18 @@ class _Writer:
         auto = ground_name(action.schema, tuple(place.binding.get(arg, arg) for arg in action.args))
         label = shown(node.name or auto)
         guard = guard_of(self.task, node)
-        if self.profile == "bbtc":
+        forgets = node.latched and bool(place.forget)  # our node Latch never does
+        if self.profile == "bbtc" and not forgets:
             tag = self._leaf(action, place.binding)
             needed = self._start_conditions(guard, place.binding, place.counters)
             element = self.idioms.latch(tag, needed, node.latched)
             element.set("name", label)
             return element
-        tree_id = self._action_tree(node, action, guard, place.counters)
+        entry = self.idioms.latch_entry(next(self.latches)) if forgets else None
+        if entry is not None:
+            for scripts in place.forget:
+                scripts.append(forgotten(entry))
+        tree_id = self._action_tree(node, action, guard, place.counters, entry)
         element = Element("SubTree", ID=tree_id, name=place.labels.unique(label))
         for port, arg in self._ports(action):
             if port in self.subtree_ports[tree_id]:
@@ -263,9 +281,15 @@ class _Writer:
         return element
 
     def _action_tree(
-        self, node: ActionNode, action: GroundAction, guard: Condition | None, counters: tuple[str, ...]
+        self,
+        node: ActionNode,
+        action: GroundAction,
+        guard: Condition | None,
+        counters: tuple[str, ...],
+        entry: str | None,
     ) -> str:
-        """The id of the BehaviorTree that runs actions of a schema."""
+        """The id of the BehaviorTree that runs actions of a schema; ``entry`` is where one that is latched
+        for an attempt keeps how it ended."""
         # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
         passed = {port: arg for port, arg in self._ports(action) if not is_numeric(arg)}
         tag = Element(self.names.ids[action_symbol(action)])
@@ -274,9 +298,12 @@ class _Writer:
         binding = {arg: port for port, arg in reversed(passed.items())}
         needed = self._start_conditions(guard, binding, counters)
         title = self.names.plain[action_symbol(action)]
-        title += ("Once" if node.latched else "Again") + ("WhenReady" if needed else "")
-        write = self.idioms.latched if node.latched else self.idioms.unlatched
-        content = write(tag, needed)
+        often = "Again" if not node.latched else "Once" if entry is None else "OnceAnAttempt"
+        title += often + ("WhenReady" if needed else "")
+        if entry is not None:
+            content = self.idioms.latched(tag, needed, entry)
+        else:
+            content = (self.idioms.latched if node.latched else self.idioms.unlatched)(tag, needed)
         key = (title, tostring(content))
         if key not in self.action_trees:
             tree_id = self.tree_ids.take(title, seed=repr(key))

@@ -21,6 +21,8 @@ Profile: TypeAlias = Literal["stock", "bbtc"]
 SKIPPER, LATCH = "Skipper", "Latch"
 """Ids of our own control nodes."""
 
+UNTIL_SUCCESS = "RetryUntilSuccessful"
+
 SKIPPER_LABEL = "skipper"
 """The name that a Parallel gets where the Skipper has none."""
 
@@ -48,11 +50,19 @@ class Idioms:
         """The entry that counts the attempts a retry node has left."""
         return f"@{self.own}attempts_left_{number}"
 
+    def attempt_state(self, number: int) -> str:
+        """The entry that tells how far the attempt of a retry-until-success node is."""
+        return f"@{self.own}attempt_{number}"
+
+    def latch_entry(self, number: int) -> str:
+        """The entry that tells how an action ended that is latched for an attempt only."""
+        return f"@{self.own}latch_{number}"
+
     # --- control nodes -----------------------------------------------------------------------
 
     def control(self, kind: ControlKind, children: Sequence[Element]) -> Element:
-        """A memoryless control node (not for ``retry``: see :meth:`retry`). The engine refuses control
-        nodes without children; they return the status they go on with."""
+        """A memoryless control node (those that count attempts have a method each). The engine refuses
+        control nodes without children; they return the status they go on with."""
         match kind:
             case "sequence":
                 return _around("ReactiveSequence" if children else "AlwaysSuccess", children)
@@ -67,7 +77,7 @@ class Idioms:
                 element.set("success_count", "1")
                 element.set("failure_count", "1")
                 return element
-            case "retry":
+            case "retry" | "retry-until-success":
                 raise ValueError("a retry node has its own form")
             case _:
                 assert_never(kind)
@@ -75,10 +85,30 @@ class Idioms:
     def retry(self, counter: str, attempts: int, child: Element) -> Element:
         """The child, and the number of attempts that actions below it may make, set once."""
         once = Element("RunOnce", then_skip="false")
-        SubElement(once, "Script", code=f"{counter} := {attempts}")
+        SubElement(once, "Script", code=full_again(counter, attempts))
         element = self.control("sequence", [once, child])
         element.set("name", f"at most {attempts} attempt{'s' if attempts > 1 else ''}")
         return element
+
+    def retry_until_success(
+        self, state: str, attempts: int, child: Element, forget: Sequence[str]
+    ) -> Element:
+        """The child, tried so often; after each time, scripts ``forget`` what is remembered below. After an
+        attempt that fails in the tick that it begins in, the engine's node would be RUNNING, and what runs
+        elsewhere be halted: such an attempt is the last, for the next ones would fail likewise."""
+        once = Element("RunOnce", then_skip="false")
+        SubElement(once, "Script", code=f"{state} := 'new'")
+        begun = decorated("KeepRunningUntilFailure", Element("Script", code=f"{state} := 'begun'"))
+        at_once = Element("ScriptCondition", code=f"{state} == 'new'", _onSuccess=f"{state} := 'hopeless'")
+        attempt = self.control("fallback", [self.control("skipper", [child, begun]), at_once])
+        for event, script in attempt_ends(state, forget).items():
+            attempt.set(event, script)
+        retry = decorated(UNTIL_SUCCESS, attempt)
+        retry.set("num_attempts", str(attempts))
+        done = Element("ScriptCondition", code=f"{state} != 'hopeless'")
+        done.set("_onSuccess", f"{state} := 'new'")
+        done.set("_onFailure", f"{state} := 'new'")
+        return self.control("sequence", [once, retry, done])
 
     def until_blocked(self, root: Element) -> Element:
         """The tree, and FAILURE as soon as it is running while no action is: nothing can change
@@ -110,15 +140,15 @@ class Idioms:
             element.set("flag", self.acting)
         return element
 
-    def latched(self, action: Element, needed: Sequence[Element]) -> Element:
+    def latched(self, action: Element, needed: Sequence[Element], entry: str = "_latch") -> Element:
         """Runs the action once. Its status is withheld until the next tick, because conditions to the
         left were read before its effect; then it is kept. Halted after its start counts as run."""
-        latch = Element("Switch2", variable="{_latch}", case_1="success", case_2="failure")
+        latch = Element("Switch2", variable=f"{{{entry}}}", case_1="success", case_2="failure")
         SubElement(latch, "AlwaysSuccess")
         SubElement(latch, "AlwaysFailure")
-        action.set("_onSuccess", "_latch := 'success'")
-        action.set("_onFailure", "_latch := 'failure'")
-        action.set("_onHalted", "_latch := 'success'")
+        action.set("_onSuccess", f"{entry} := 'success'")
+        action.set("_onFailure", f"{entry} := 'failure'")
+        action.set("_onHalted", f"{entry} := 'success'")
         running = self._running(action, f"@{self.acting} := true")
         if needed:
             # With memory: once the action runs, its own effect may end its precondition.
@@ -164,6 +194,23 @@ class Idioms:
         answer = Element("Precondition", {"if": "_value != 'unknown'", "else": "RUNNING"})
         SubElement(answer, "ScriptCondition", code="_value == 'true'")
         return self.control("sequence", [read, answer])
+
+
+def attempt_ends(state: str, forget: Sequence[str]) -> dict[str, str]:
+    """By event, the script of the end of an attempt (:meth:`Idioms.retry_until_success`)."""
+    failed = "; ".join([*forget, f"{state} := 'new'"])
+    ends = {"_onFailure": failed, "_onHalted": failed}
+    return {"_onSuccess": "; ".join(forget), **ends} if forget else ends
+
+
+def forgotten(entry: str) -> str:
+    """The script that makes an action forget how it ended."""
+    return f"{entry} := 'none'"
+
+
+def full_again(counter: str, attempts: int) -> str:
+    """The script that gives a retry node all its attempts."""
+    return f"{counter} := {attempts}"
 
 
 def is_retry_label(text: str) -> bool:

@@ -28,7 +28,7 @@ from bbtc.ground.condition import TRUE, And, Condition, Or
 from bbtc.ground.describe import condition_as_lists
 from bbtc.ground.task import Task
 from bbtc.rounding import figure_text
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree, walk
 
 MARK = " bbtc import reads here what the file cannot show:"
 """The first line of the comment."""
@@ -71,11 +71,20 @@ def notes(tree: Tree, root: Node, names: BtcppNames) -> str:
     return "\n".join([MARK, *_lines(content), "  "])
 
 
+_LETTERS: dict[ControlKind, str] = {
+    "sequence": "S",
+    "fallback": "F",
+    "skipper": "K",
+    "retry": "R",
+    "retry-until-success": "U",
+}
+
+
 def kind_of(task: Task, node: Node) -> str:
     """A letter for the kind of a node, and for a leaf three digits that tell it from most others."""
     match node:
         case ControlNode(kind=kind):
-            return {"sequence": "S", "fallback": "F", "skipper": "K", "retry": "R"}[kind]
+            return _LETTERS[kind]
         case ConditionNode():
             return f"c{_digits(words_of(task, written(task, node.condition)).full)}"
         case ActionNode():
@@ -84,7 +93,7 @@ def kind_of(task: Task, node: Node) -> str:
             assert_never(node)
 
 
-KIND = re.compile("[SFKR]|[ca][0-9a-f]{3}")
+KIND = re.compile("[SFKRU]|[ca][0-9a-f]{3}")
 """What :func:`kind_of` makes."""
 
 

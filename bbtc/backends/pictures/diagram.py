@@ -17,7 +17,7 @@ from typing import Literal, TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.backends.exporter import Figures, Option
-from bbtc.backends.pictures.outline import UNICODE
+from bbtc.backends.pictures.outline import UNICODE, bound
 from bbtc.ground.describe import describe
 from bbtc.printable import printable
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
@@ -125,7 +125,7 @@ def _lines(tree: Tree, node: Node) -> tuple[str, ...]:
     match node:
         case ControlNode():
             if node.attempts is not None:
-                labels.append(f"at most {node.attempts}")
+                labels.append(bound(node.kind, node.attempts))
         case ConditionNode():
             labels.append(describe(tree.task, node.condition))
         case ActionNode():
@@ -139,7 +139,9 @@ def _note(tree: Tree, node: Node) -> str:
     text: str
     match node:
         case ControlNode():
-            text = node.kind if node.attempts is None else f"{node.kind}, at most {node.attempts} actions"
+            text = node.kind
+            if node.attempts is not None:
+                text += f", {bound(node.kind, node.attempts)}{' actions' if node.kind == 'retry' else ''}"
         case ConditionNode():
             text = f"condition {describe(tree.task, node.condition)}"
         case ActionNode():

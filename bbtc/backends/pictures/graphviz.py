@@ -43,6 +43,7 @@ _PROGRAMS = ("dot", "graphviz-pure")
 _STAND_INS: dict[ControlKind, str] = {
     "skipper": "»",
     "retry": "@",
+    "retry-until-success": "@@",
 }  # the fonts inside graphviz-pure lack these arrows
 _PLAIN_ID = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 

@@ -19,7 +19,7 @@ from bbtc.backends.pictures.diagram import (
 )
 from bbtc.tree.nodes import Tree
 
-_SAFE = frozenset(" !'()*+,-./0123456789:=?ABCDEFGHIJKLMNOPQRSTUVWXYZ_abcdefghijklmnopqrstuvwxyz→⇒↻…")
+_SAFE = frozenset(" !'()*+,-./0123456789:=?ABCDEFGHIJKLMNOPQRSTUVWXYZ_abcdefghijklmnopqrstuvwxyz→⇒↻↺…")
 
 
 @dataclass(frozen=True, slots=True)

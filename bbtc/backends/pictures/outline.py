@@ -30,15 +30,26 @@ UNICODE = Strokes(
     "└─ ",
     "│  ",
     "   ",
-    MappingProxyType({"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻"}),
+    MappingProxyType(
+        {"sequence": "→", "fallback": "?", "skipper": "⇒", "retry": "↻", "retry-until-success": "↺"}
+    ),
 )
 ASCII = Strokes(
     "|- ",
     "`- ",
     "|  ",
     "   ",
-    MappingProxyType({"sequence": "->", "fallback": "?", "skipper": "=>", "retry": "@"}),
+    MappingProxyType(
+        {"sequence": "->", "fallback": "?", "skipper": "=>", "retry": "@", "retry-until-success": "@@"}
+    ),
 )
+
+
+def bound(kind: ControlKind, attempts: int) -> str:
+    """What the number of attempts of a node says."""
+    if kind == "retry":
+        return f"at most {attempts}"
+    return f"{attempts} attempt{'s' if attempts > 1 else ''}"
 
 
 def label(task: Task, node: Node, strokes: Strokes = UNICODE) -> str:
@@ -48,7 +59,7 @@ def label(task: Task, node: Node, strokes: Strokes = UNICODE) -> str:
         case ControlNode():
             parts = [strokes.symbols[node.kind]]
             if node.attempts is not None:
-                parts.append(f"at most {node.attempts}")
+                parts.append(bound(node.kind, node.attempts))
             if node.template is not None:
                 parts.append(f"<{node.template}>")
         case ConditionNode():

@@ -151,6 +151,8 @@ def _draw_symbol(parent: Element, symbol: str, x: float, y: float, ink: str) -> 
         path = f"M {_px(x - 8)} {_px(y)} h 16 m -5 -4 l 5 4 l -5 4"
     elif symbol == SYMBOLS["retry"]:
         path = f"M {_px(x + 4)} {_px(y - 4)} a 6 6 0 1 0 2 5 m -6 -5 h 5 v -5"
+    elif symbol == SYMBOLS["retry-until-success"]:
+        path = f"M {_px(x - 4)} {_px(y - 4)} a 6 6 0 1 1 -2 5 m 6 -5 h -5 v -5"
     else:
         path = f"M {_px(x - 8)} {_px(y - 2)} h 13 m -13 4 h 13 m -3 -7 l 6 5 l -6 5"
     SubElement(parent, "path", {"d": path, "fill": "none", "stroke": ink, "stroke-width": "1.3"})

@@ -33,6 +33,7 @@ from bbtc.printable import printable
 from bbtc.tree.nodes import (
     ActionNode,
     ConditionNode,
+    ControlKind,
     ControlNode,
     Node,
     Tree,
@@ -153,7 +154,7 @@ class _Writer:
                     return self._branch(node)
                 children = [self._code(child, level + 1) for child in node.children]
                 bound = [] if node.attempts is None else [str(node.attempts)]
-                return call(node.kind, literal(_label(node)), *bound, *children)
+                return call(_FUNCTIONS[node.kind], literal(_label(node)), *bound, *children)
             case ConditionNode():
                 condition = normal(self.task, node.condition)
                 label = node.name or words_of(self.task, condition).short
@@ -188,6 +189,16 @@ class _Writer:
     def _read(self, variable: int) -> Code:
         read = self.task.variables[variable]
         return call(f"robot.{self.names.methods[variable_symbol(read)]}", *map(literal, read.args))
+
+
+_FUNCTIONS: dict[ControlKind, str] = {
+    "sequence": "sequence",
+    "fallback": "fallback",
+    "skipper": "skipper",
+    "retry": "retry",
+    "retry-until-success": "until_success",
+}
+"""The function of :mod:`bbtc.runtime` that makes a node of each kind."""
 
 
 def _thunk(code: Code) -> Code:

@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 WIDTH = 100
@@ -19,11 +18,11 @@ class Group:
     head: str
     items: tuple[Code, ...]
     tail: str = ")"
+    flat: str = field(init=False)
+    """The text on one line: made with the group, from the inside out, since expressions are deep."""
 
-    @cached_property
-    def flat(self) -> str:
-        """The text on one line."""
-        return f"{self.head}{', '.join(map(flat, self.items))}{self.tail}"
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "flat", f"{self.head}{', '.join(map(flat, self.items))}{self.tail}")
 
 
 @dataclass(frozen=True)
@@ -32,11 +31,10 @@ class Prefixed:
 
     prefix: str
     code: Code
+    flat: str = field(init=False)
 
-    @cached_property
-    def flat(self) -> str:
-        """The text on one line."""
-        return f"{self.prefix}{flat(self.code)}"
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "flat", f"{self.prefix}{flat(self.code)}")
 
 
 Code: TypeAlias = str | Group | Prefixed

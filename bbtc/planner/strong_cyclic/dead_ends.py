@@ -20,7 +20,7 @@ from bbtc.planner.strong_cyclic.partial_state import (
 )
 from bbtc.planner.strong_cyclic.policy import Covers, Forbidden
 from bbtc.planner.strong_cyclic.relaxation import Relaxation
-from bbtc.planner.strong_cyclic.weak_plan import Exhausted, Taken
+from bbtc.planner.strong_cyclic.ways import Exhausted, Taken
 
 _MOST_WORK = 200_000  # states times actions that are gone through to generalise an exhausted search
 _MOST_TOLD = 16  # states of an exhausted search that others learn from

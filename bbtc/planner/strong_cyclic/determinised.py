@@ -19,6 +19,7 @@ from bbtc.planner.strong_cyclic.partial_state import (
     Reasons,
     satisfied,
     united,
+    without,
 )
 
 MOST_OUTCOMES = 4096
@@ -51,6 +52,8 @@ class Step:
     sets: tuple[tuple[int, Truth], ...]
     """What is set whatever the state: the value of each variable after all unconditional assignments."""
     guarded: tuple[Assignment, ...]
+    touched: int
+    """Bits of all variables that some assignment sets."""
 
     def apply(self, state: int) -> int:
         """The state after it."""
@@ -115,7 +118,10 @@ class Determinised:
         made.sort(key=lambda part: (part.when != ALWAYS, part.sets, repr(part.when)))
         plain = next((part for part in made if part.when == ALWAYS), self._assignment(ALWAYS, ()))
         guarded = tuple(made) if any(part.when != ALWAYS for part in made) else ()
-        return Step(~plain.clear, plain.true | plain.unknown, plain.sets, guarded)
+        touched = 0
+        for part in made:
+            touched |= part.clear
+        return Step(~plain.clear, plain.true | plain.unknown, plain.sets, guarded, touched)
 
     def _assignment(self, when: BitTest, sets: tuple[tuple[int, Truth], ...]) -> Assignment:
         clear = true = unknown = kill = 0
@@ -177,11 +183,10 @@ class Determinised:
     def before(self, step: Step, state: int, wanted: PartialState, known: int = 0) -> PartialState:
         """What of a state, from which a step leads to ``wanted``, is enough for that. Bits of the mask
         ``known`` cost nothing."""
+        found = without(wanted, step.touched)
         if not step.guarded:
-            left = wanted.mask & step.keep
-            return PartialState(left, wanted.value & left)
-        found = ANY_STATE
-        variables = sorted({self.packing.owner(bit) for bit in set_bits(wanted.mask)})
+            return found
+        variables = sorted({self.packing.owner(bit) for bit in set_bits(wanted.mask & step.touched)})
         for variable in variables:
             why = self._why_set(step, state, variable, wanted, known | found.mask)
             found = united(found, why)
@@ -227,7 +232,8 @@ def _joint(factors: tuple[Factor, ...]) -> Iterator[frozenset[Effect]]:
                 drawn.update((own | nested, None) for nested in _joint(outcome.factors))
         if len(total) * len(drawn) > MOST_OUTCOMES:
             raise Limits.reached(
-                f"an action with more than {MOST_OUTCOMES} joint outcomes ended the search for a policy",
+                f"an action with more than {MOST_OUTCOMES} joint outcomes ended the search for a policy that"
+                " surely succeeds",
                 "--strategy auto",
             )
         total = dict.fromkeys(one | other for one in total for other in drawn)

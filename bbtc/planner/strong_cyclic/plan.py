@@ -10,8 +10,9 @@ from fractions import Fraction
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import success_of
-from bbtc.diagnostics import LimitReached
+from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.options import DEFAULTS, Options
@@ -48,6 +49,7 @@ def plan_strong_cyclic(
     goal: Node = numbered(ConditionNode("", task.goal))
     best = BestTree.start(task, target, options.best, goal, limits)
     solver: Solver | None = None
+    refused: Diagnostic | None = None
     status: PlanStatus = "stuck"
     try:
         sure = limits.part(_FOR_SURE)
@@ -57,8 +59,9 @@ def plan_strong_cyclic(
                 _keep(best, solver, solved, limits)
             case Hopeless():
                 status = "out-of-reach" if target == 1 else "stuck"
-    except LimitReached:
-        pass
+    except LimitReached as reached:
+        if solver is None:
+            refused = reached.diagnostics[0]
     except KeyboardInterrupt:
         status = "interrupted"
     if best.success == 1 or status == "interrupted":
@@ -71,7 +74,17 @@ def plan_strong_cyclic(
     plan = plan_policy(task, target, limits, progress, replace(options, best=best), advice=advice)
     if status == "out-of-reach" and plan.tree.status == "limit-reached":
         plan = replace(plan, tree=replace(plan.tree, status=status))
-    return plan
+    return plan if refused is None or plan.stop is None else replace(plan, stop=refused)
+
+
+def sure_starts(task: Task, limits: Limits) -> list[tuple[Truth, ...]]:
+    """The initial states of a task from which a policy surely reaches the goal. Raises ``LimitReached``."""
+    solver = Solver(task, limits)
+    while isinstance(answer := solver.run(), Hopeless):
+        solver.leave_out(answer.state)
+    left = set(solver.initial)
+    pack = solver.model.packing.pack
+    return [each.values for each in task.initial if pack(bytes(each.values)) in left]
 
 
 class _Advice:

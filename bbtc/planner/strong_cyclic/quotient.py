@@ -29,7 +29,7 @@ from bbtc.planner.strong_cyclic.determinised import Determinised, Step
 from bbtc.planner.strong_cyclic.exclusion import Exclusion
 from bbtc.planner.strong_cyclic.partial_state import ANY_STATE, PartialState, satisfied, united
 from bbtc.planner.strong_cyclic.visit import Visit
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, actions_of, walk
+from bbtc.tree.nodes import COUNTING, ActionNode, ConditionNode, ControlNode, Node, actions_of, walk
 
 
 def quotient_chain(
@@ -38,7 +38,7 @@ def quotient_chain(
     """The quotient of the chain of a tree that remembers nothing. Raises ``LimitReached``; ``ValueError``
     for a tree with latched actions or retry nodes."""
     if any(action.latched for action in actions_of(root)) or any(
-        isinstance(node, ControlNode) and node.kind == "retry" for node in walk(root)
+        isinstance(node, ControlNode) and node.kind in COUNTING for node in walk(root)
     ):
         raise ValueError("a tree that remembers what it did")
     ticks = _Ticks(task, root, limits, model, exclusion)
@@ -190,7 +190,7 @@ class _Ticks:
 
                 return guarded
             case ControlNode():
-                if node.kind == "retry":
+                if node.kind in COUNTING:
                     raise ValueError("a tree that remembers what it did")
                 children = [self._compiled(child) for child in node.children]
                 if node.kind == "fallback" and len(children) >= _MANY_CHILDREN:

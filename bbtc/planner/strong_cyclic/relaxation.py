@@ -29,11 +29,13 @@ _OPERATORS_AT_ONCE = 1024  # between two looks at the limits
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """``steps`` of a relaxed plan, the actions of it that may start at once, and all of it: actions with the
-    outcomes wanted, those that need least first."""
+    outcomes wanted, those that need least first. ``wanted`` are the facts that it reaches because something
+    needs them, as bits that are to be set and bits that are to be clear."""
 
     steps: int
     helpful: tuple[int, ...]
     plan: tuple[tuple[int, Step], ...]
+    wanted: tuple[int, int]
 
 
 class Relaxation:
@@ -142,6 +144,11 @@ class Relaxation:
             yield 4 * variable + int(value)
             if value != 1 and 4 * variable + 3 in known:
                 yield 4 * variable + 3
+
+    @property
+    def size(self) -> int:
+        """How many operators there are."""
+        return len(self._needs)
 
     def forbid(self, action: int, partial: PartialState) -> None:
         """The action must not start where something holds: one of its literals must not hold."""
@@ -272,6 +279,7 @@ class Relaxation:
 
     def _relaxed_plan(self, by: list[int], total: list[int]) -> Estimate:
         chosen: dict[int, dict[Step, None]] = {}
+        wanted: list[int] = []
         seen = {self.goal}
         stack = [self.goal]
         while stack:
@@ -281,6 +289,7 @@ class Relaxation:
                 continue
             if self._action[operator] >= 0:
                 chosen.setdefault(operator, {})[self._steps[operator][reached]] = None
+                wanted.append(reached)
             for fact in self._needs[operator]:
                 if fact not in seen:
                     seen.add(fact)
@@ -288,7 +297,24 @@ class Relaxation:
         operators = sorted(chosen, key=lambda operator: (total[operator], operator))
         helpful = {self._action[operator] for operator in operators if not total[operator]}
         plan = [(self._action[operator], step) for operator in operators for step in chosen[operator]]
-        return Estimate(len(operators), tuple(sorted(helpful)), tuple(plan))
+        return Estimate(len(operators), tuple(sorted(helpful)), tuple(plan), self._bits(wanted))
+
+    def _bits(self, facts: Iterable[int]) -> tuple[int, int]:
+        """Bits that are set where facts hold, and bits that are clear."""
+        found, clear = 0, 0
+        for fact in facts:
+            variable, kind = divmod(fact, 4)
+            bits = self.packing.bits(variable)
+            match kind:
+                case 0:
+                    clear |= bits
+                case 1:
+                    found |= bits & ~(1 << variable)
+                case 2:
+                    found |= 1 << variable
+                case _:
+                    clear |= bits & ~(1 << variable)
+        return found, clear
 
     # --- dead ends ----------------------------------------------------------------------------------
 

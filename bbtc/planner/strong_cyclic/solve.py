@@ -30,7 +30,8 @@ from bbtc.planner.strong_cyclic.partial_state import (
 from bbtc.planner.strong_cyclic.policy import Forbidden, Pair, Policy
 from bbtc.planner.strong_cyclic.relaxation import Relaxation
 from bbtc.planner.strong_cyclic.visit import Node, Visit
-from bbtc.planner.strong_cyclic.weak_plan import Exhausted, Searcher, Taken, WeakPlan
+from bbtc.planner.strong_cyclic.ways import Exhausted, Taken, WeakPlan
+from bbtc.planner.strong_cyclic.weak_plan import Searcher
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,11 @@ class Solver:
                     raise AssertionError("a policy whose pairs lead ever closer to the goal is trapped")
                 self.strict = True
                 self._afresh()
+
+    def leave_out(self, state: int) -> None:
+        """Search for a policy from the other initial states only, by all that was learnt."""
+        self.initial.remove(state)
+        self._afresh()
 
     def _doubt(self, pairs: set[int]) -> bool:
         """Some pairs were not settled; True if they were trusted to be."""

@@ -10,50 +10,28 @@ far from the goal (Lipovetzky, Geffner, "Best-first width search", 2017), which 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from heapq import heappop, heappush
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from bbtc.limits import Limits
-from bbtc.planner.strong_cyclic.determinised import Determinised, Step
+from bbtc.planner.strong_cyclic.determinised import Determinised
+from bbtc.planner.strong_cyclic.novelty import ByNovelty
 from bbtc.planner.strong_cyclic.partial_state import satisfied
 from bbtc.planner.strong_cyclic.policy import Forbidden
 from bbtc.planner.strong_cyclic.relaxation import Estimate, Relaxation
+from bbtc.planner.strong_cyclic.ways import Exhausted, Taken, WeakPlan, traced
 
 _HELPFUL, _NOVEL, _ALL = 1, 2, 0
 _QUEUES = (_HELPFUL, _NOVEL, _ALL)  # in this order where their priorities are equal
 _BOOST = 1000  # expansions that helpful actions are preferred for after progress
 _STALLED = 250  # expansions without progress, after which the third queue is used, too
+_LONG = 100  # and after which the search by novelty is tried beside this one
+_AT_THE_COST = 50  # operators of the relaxation: to expand a state takes as long as they do in an estimate
 _SHORT_WAY = 2  # steps of a relaxed plan that are worth following; single ones are tried anyway
 _LOOK = 64  # evaluations between two looks at the limits
 
 
 _Entry: TypeAlias = tuple[tuple[int, int], int, int]
-
-
-class Taken(NamedTuple):
-    """A step of a plan: the state before, the action, the outcome."""
-
-    state: int
-    action: int
-    step: Step
-
-
-@dataclass(frozen=True, slots=True)
-class WeakPlan:
-    """The steps, and the state that they lead to."""
-
-    steps: tuple[Taken, ...]
-    end: int
-
-
-@dataclass(frozen=True, slots=True)
-class Exhausted:
-    """There is no weak plan. ``seen`` are all states that can be reached, in order, but for what follows
-    dead ends of the relaxation, which are ``dead``."""
-
-    seen: tuple[int, ...]
-    dead: tuple[int, ...]
 
 
 class Searcher:
@@ -65,6 +43,11 @@ class Searcher:
         self.model, self.relaxation, self.forbidden, self.limits = model, relaxation, forbidden, limits
         self.evaluations = 0
         self._estimates: dict[int, Estimate | None] = {}
+
+    @property
+    def _worth(self) -> int:
+        """How many states are expanded in about the time that an estimate takes."""
+        return self.relaxation.size // _AT_THE_COST
 
     def estimate(self, state: int) -> Estimate | None:
         """How far the goal is, None for a dead end of the relaxation."""
@@ -91,15 +74,19 @@ class Searcher:
     ) -> WeakPlan | Exhausted:
         """A plan from a state to one that has ``arrived``, by steps that are not forbidden. ``on_dead_end``
         is told every dead end of the relaxation, and the step that led to it."""
-        at_once = self._at_once(start, arrived)
-        if at_once is not None:
-            return at_once
+        near = self._near(start, arrived)
+        if near is not None:
+            return near
         parent: dict[int, Taken | None] = {start: None}
         depth = {start: 0}
         frontier = _Frontier(start)
         dead: dict[int, None] = {}
         ahead: int | None = None
+        beside = ByNovelty(self, start, arrived)
         while frontier:
+            plan = beside.go_on(self._worth) if frontier.idle >= _LONG else None
+            if plan is not None:
+                return plan
             state = frontier.pop() if ahead is None else ahead
             ahead = None
             if state in frontier.expanded or state in dead:
@@ -124,7 +111,7 @@ class Searcher:
                     parent[after] = Taken(state, number, step)
                     depth[after] = depth[state] + 1
                     if arrived(after):
-                        return _traced(parent, after)
+                        return traced(parent, after)
                     frontier.push(after, (found.steps, depth[after]), number in helpful, novel)
             for taken, after in self._followed(state, found, arrived) if frontier.progress else ():
                 ahead = after
@@ -132,16 +119,24 @@ class Searcher:
                     parent[after], depth[after] = taken, depth[taken.state] + 1
                     frontier.push(after, (found.steps, depth[after]), True, novel)
             if ahead is not None and arrived(ahead):
-                return _traced(parent, ahead)
+                return traced(parent, ahead)
         return Exhausted(tuple(frontier.expanded), tuple(dead))
 
-    def _at_once(self, start: int, arrived: Callable[[int], bool]) -> WeakPlan | None:
-        """A plan of one step, for which no distance need be known."""
-        for number in self.model.applicable(start):
-            for step in self.model.actions[number].steps:
-                after = step.apply(start)
-                if after != start and arrived(after) and self.forbidden.forbids(start, number) is None:
-                    return WeakPlan((Taken(start, number, step),), after)
+    def _near(self, start: int, arrived: Callable[[int], bool]) -> WeakPlan | None:
+        """A plan of the fewest steps, if one is found in the time that it takes to tell one distance."""
+        parent: dict[int, Taken | None] = {start: None}
+        states = [start]
+        for state in states:  # grows while it is read
+            for number in self.model.applicable(state):
+                for step in self.model.actions[number].steps:
+                    after = step.apply(state)
+                    if after in parent or self.forbidden.forbids(state, number) is not None:
+                        continue
+                    parent[after] = Taken(state, number, step)
+                    if arrived(after):
+                        return traced(parent, after)
+                    if len(states) <= self._worth:
+                        states.append(after)
         return None
 
     def _followed(
@@ -195,12 +190,17 @@ class _Frontier:
     def __bool__(self) -> bool:
         return bool(self._queues[_ALL] or self._queues[_HELPFUL])
 
+    @property
+    def idle(self) -> int:
+        """The number of expansions without progress."""
+        return len(self.expanded) - self._progress
+
     def pop(self) -> int:
         """The next state; it may have been expanded before."""
-        idle = len(self.expanded) - self._progress
-        if idle == _STALLED:
+        if self.idle == _STALLED:
             self._priority[_NOVEL] = min(self._priority)
-        usable = [each for each in _QUEUES if self._queues[each] and (idle >= _STALLED or each != _NOVEL)]
+        stalled = self.idle >= _STALLED
+        usable = [each for each in _QUEUES if self._queues[each] and (stalled or each != _NOVEL)]
         which = min(usable, key=lambda number: self._priority[number])
         self._priority[which] += 1
         return heappop(self._queues[which])[-1]
@@ -225,12 +225,3 @@ class _Frontier:
             heappush(self._queues[_HELPFUL], (rank, self._count, state))
         if novel:
             heappush(self._queues[_NOVEL], ((self._count, 0), self._count, state))
-
-
-def _traced(parent: dict[int, Taken | None], end: int) -> WeakPlan:
-    steps: list[Taken] = []
-    taken = parent[end]
-    while taken is not None:
-        steps.append(taken)
-        taken = parent[taken.state]
-    return WeakPlan(tuple(reversed(steps)), end)

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.backends.btcpp.idioms import LATCH, SKIPPER
+from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, UNTIL_SUCCESS
 from bbtc.backends.btcpp.reader.xmltext import XmlElement
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
@@ -228,12 +228,64 @@ RETRY = Shape(
 )
 """A node below which every action uses up an attempt."""
 
-_LATCHED = dict(
-    zip(_EVENTS, ("_latch := 'success'", "_latch := 'failure'", "_latch := 'success'"), strict=True)
+_ENTRY = rf"(?P<entry>_latch|{_COUNTER})"
+
+
+def _latching(status: str) -> Pattern:
+    return Pattern(re.compile(rf"{_ENTRY} := '{status}'"), f"_latch := '{status}'")
+
+
+def _state(relation: str, word: str) -> Pattern:
+    code = f"{relation} '{word}'"
+    return Pattern(re.compile(rf"(?P<state>{_COUNTER}) {code}"), f"@x {code}")
+
+
+_NEW = _state(":=", "new")
+TRIED = Shape(
+    "ReactiveSequence",
+    {},
+    (
+        Shape("RunOnce", {"then_skip": "false"}, (_script(_NEW),)),
+        Shape(
+            UNTIL_SUCCESS,
+            {"num_attempts": Pattern(re.compile("(?P<attempts>[1-9][0-9]{0,5})"), "3")},
+            (
+                Shape(
+                    "ReactiveFallback",
+                    {},
+                    (
+                        Shape(
+                            SKIPPER,
+                            {},
+                            (
+                                Hole("child"),
+                                Shape("KeepRunningUntilFailure", {}, (_script(_state(":=", "begun")),)),
+                            ),
+                        ),
+                        Shape(
+                            "ScriptCondition",
+                            {"code": _state("==", "new"), "_onSuccess": _state(":=", "hopeless")},
+                        ),
+                    ),
+                ),
+            ),
+        ),
+        Shape(
+            "ScriptCondition",
+            {"code": _state("!=", "hopeless"), "_onSuccess": _NEW, "_onFailure": _NEW},
+        ),
+    ),
 )
+"""A node that tries its child again; scripts of the ReactiveFallback make all below forget."""
+
+_LATCHED = dict(zip(_EVENTS, map(_latching, ("success", "failure", "success")), strict=True))
 _RUN_LATCHED = _running(_RAISED, Hole("leaf", _LATCHED))
 _RUN_STARTED = _running(_RAISED_AND_STARTED, Hole("leaf", dict.fromkeys(_EVENTS, "_started := 'no'")))
-_SWITCH = {"variable": "{_latch}", "case_1": "success", "case_2": "failure"}
+_SWITCH: dict[str, Value] = {
+    "variable": Pattern(re.compile(rf"\{{{_ENTRY}\}}"), "{_latch}"),
+    "case_1": "success",
+    "case_2": "failure",
+}
 _ACTIONS: tuple[tuple[Shape, str | None], ...] = (
     (Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, _RUN_LATCHED)), "_latch"),
     (
@@ -306,7 +358,15 @@ READ = frozenset(
 ).union(
     *(
         _tags(shape)
-        for shape in (UNTIL_BLOCKED, RETRY, KNOWN, UNKNOWN, REGISTER, *(shape for shape, _ in _ACTIONS))
+        for shape in (
+            UNTIL_BLOCKED,
+            RETRY,
+            TRIED,
+            KNOWN,
+            UNKNOWN,
+            REGISTER,
+            *(shape for shape, _ in _ACTIONS),
+        )
     )
 )
 """The nodes that mean something in some place, besides the leaves of a task."""
@@ -334,7 +394,7 @@ def action_of(element: XmlElement) -> ActionParts | None:
     """The parts of an action idiom; None if this is none."""
     if has(element, LATCH) and element.children:
         return _latch(element)
-    for shape, entry in _ACTIONS:
+    for shape, keeps in _ACTIONS:
         found = match(shape, element)
         if found is None:
             continue
@@ -342,7 +402,8 @@ def action_of(element: XmlElement) -> ActionParts | None:
         if "ready" in found.parts:
             needed = _needed(found.part("ready"), found)
         leaf, flag = found.part("leaf"), found.texts.get("flag", "")
-        return _parts(leaf, needed, found, latched=entry == "_latch", flag=flag, entry=entry)
+        entry = found.texts.get("entry", keeps)
+        return _parts(leaf, needed, found, latched=keeps == "_latch", flag=flag, entry=entry)
     return None
 
 

@@ -14,7 +14,15 @@ from fractions import Fraction
 from itertools import islice
 
 from bbtc.artefacts.cursor import clip
-from bbtc.backends.btcpp.idioms import LATCH, SKIPPER_LABEL, is_retry_label
+from bbtc.backends.btcpp.idioms import (
+    LATCH,
+    SKIPPER_LABEL,
+    UNTIL_SUCCESS,
+    attempt_ends,
+    forgotten,
+    full_again,
+    is_retry_label,
+)
 from bbtc.backends.btcpp.names import is_numeric, shown, without_number
 from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE
 from bbtc.backends.btcpp.reader.conditions import ConditionReader
@@ -25,6 +33,7 @@ from bbtc.backends.btcpp.reader.patterns import (
     READ,
     REGISTER,
     RETRY,
+    TRIED,
     UNTIL_BLOCKED,
     ActionParts,
     Match,
@@ -57,7 +66,7 @@ _HINTS = {
     "Sequence": "it has memory; a tree reads its conditions in every tick: use ReactiveSequence",
     "SequenceWithMemory": "it has memory; a tree reads its conditions in every tick: use ReactiveSequence",
     "Fallback": "it has memory; a tree reads its conditions in every tick: use ReactiveFallback",
-    "RetryUntilSuccessful": "several attempts stand side by side in a ReactiveFallback",
+    UNTIL_SUCCESS: "alone, it does not end what is remembered below it: docs/export-btcpp.md has its form",
     "Parallel": 'only one with success_count="1" failure_count="1", a skipper, has a counterpart',
 }
 
@@ -74,13 +83,15 @@ class Imported:
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """Where in the file the reader is: the values of the ports there, the BehaviorTrees around, and the
-    retry nodes around, each with its counter."""
+    """Where in the file the reader is: the values of the ports there, the BehaviorTrees around, the retry
+    nodes around, each with its counter, and the retry-until-success nodes around, each with the scripts that
+    make what was read below it forget."""
 
     ports: Mapping[str, str] = field(default_factory=dict)
     trees: tuple[str, ...] = ()
     counters: tuple[str, ...] = ()
     level: int = 1
+    forget: tuple[list[str], ...] = ()
 
     def down(self) -> Scope:
         """One level of the tree further down."""
@@ -344,6 +355,10 @@ class _Reader:
         if retry is not None:
             retried: Node = yield self._retry(element, retry, scope)
             return retried
+        until = match(TRIED, element)
+        if until is not None:
+            tried: Node = yield self._until_success(element, until, scope)
+            return tried
         condition: Condition | None = yield self._condition(element, scope)
         if condition is not None:
             return ConditionNode("", condition, self._condition_name(element, condition, scope))
@@ -389,12 +404,36 @@ class _Reader:
             hint = "give each an entry of its own; a BehaviorTree that holds one is called once"
             raise unreadable(self._document, element, "BBT0613", message, hint=hint)
         self._counters.add(counter)
+        for scripts in scope.forget:
+            scripts.append(full_again(counter, int(found.texts["attempts"])))
         inside = replace(scope.down(), counters=(*scope.counters, counter))
         node: Node = yield self._node(found.part("child"), inside)
         name = element.attributes.get("name") or None
         if name is not None and is_retry_label(name):
             name = None
         return ControlNode("", "retry", (node,), name, attempts=int(found.texts["attempts"]))
+
+    def _until_success(self, element: XmlElement, found: Match, scope: Scope) -> Deep[Node]:
+        self._unread.take(found)
+        state, scripts = found.texts["state"], list[str]()
+        if state in self._counters:
+            message = f"two nodes tell by '{clip(state)}' how far an attempt is: each sets the other back"
+            hint = "give each an entry of its own; a BehaviorTree that holds one is called once"
+            raise unreadable(self._document, element, "BBT0613", message, hint=hint)
+        self._counters.add(state)
+        inside = replace(scope.down(), forget=(*scope.forget, scripts))
+        node: Node = yield self._node(found.part("child"), inside)
+        attempt = element.children[1].children[0]
+        ends = attempt_ends(state, scripts)
+        for event in ("_onSuccess", "_onFailure", "_onHalted"):
+            if attempt.attributes.get(event) != ends.get(event):
+                message = f"'{event}' must make everything below forget what it did, and nothing else"
+                hint = f'write {event}="{ends[event]}"' if event in ends else f"leave out {event}"
+                raise unreadable(self._document, attempt, "BBT0616", message, hint=hint)
+        self._unread.took(attempt, *ends)
+        name = element.attributes.get("name") or None
+        attempts = int(found.texts["attempts"])
+        return ControlNode("", "retry-until-success", (node,), name, attempts=attempts)
 
     def _subtree(self, element: XmlElement, scope: Scope) -> Deep[Node]:
         content, inside = self._call(element, scope)
@@ -486,8 +525,19 @@ class _Reader:
             message = f"'{clip(name)}' sets '{clip(parts.flag)}', but the tree reads '{clip(self._flag)}'"
             hint = "the tree would be taken for blocked while the action runs"
             raise unreadable(self._document, element, "BBT0616", message, hint=hint)
+        lasting = parts.entry is None or not parts.entry.startswith("@")
+        if parts.latched and lasting != (not inside.forget):
+            message = f"'{clip(name)}' keeps its status for good, though it stands below a {UNTIL_SUCCESS}"
+            hint = "let it keep it in an entry of the root blackboard that each attempt ends by setting back"
+            if not lasting:
+                message = f"'{clip(name)}' keeps its status in '{parts.entry}', which nothing sets back"
+                hint = f"it is for actions below a {UNTIL_SUCCESS}; others use '_latch'"
+            raise unreadable(self._document, element, "BBT0616", message, hint=hint)
+        if parts.entry is not None and not lasting:
+            for scripts in inside.forget:
+                scripts.append(forgotten(parts.entry))
         if parts.entry is not None:
-            key = (inside.trees[-1], parts.entry)
+            key = (inside.trees[-1] if lasting else "@", parts.entry)
             if self._entries.setdefault(key, parts.leaf) is not parts.leaf:
                 message = f"another action of this BehaviorTree keeps its state in '{parts.entry}', too"
                 hint = "put each into a BehaviorTree of its own, and call it by a SubTree"

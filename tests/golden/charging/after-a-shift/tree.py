@@ -325,7 +325,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for patrolled(lobby)",
                 Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
                 Latch(
                     "scan(lobby)",
@@ -354,7 +354,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(lobby)",
                 Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
                 Latch(
                     "drive(lobby)",

@@ -337,7 +337,7 @@ def create_root(robot: Robot) -> Behaviour:
                 Latch("charge()", robot.charge, robot.cancel, keep=False),
             ),
             sequence(
-                "sequence",
+                "for patrolled(lobby)",
                 Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
                 Latch(
                     "scan(lobby)",
@@ -348,7 +348,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for patrolled(store)",
                 Condition("not patrolled(store)", lambda: negated(robot.patrolled("store"))),
                 Latch(
                     "scan(store)",
@@ -359,7 +359,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for patrolled(workshop)",
                 Condition("not patrolled(workshop)", lambda: negated(robot.patrolled("workshop"))),
                 Latch(
                     "scan(workshop)",
@@ -370,7 +370,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(station)",
                 Condition("not battery(half)", lambda: negated(robot.battery("half"))),
                 Latch(
                     "return_to_dock(station)",
@@ -392,7 +392,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(lobby)",
                 Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
                 Latch(
                     "drive(lobby)",
@@ -403,7 +403,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(store)",
                 Condition("not patrolled(store)", lambda: negated(robot.patrolled("store"))),
                 Latch(
                     "drive(store)",

@@ -336,7 +336,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(desk7)",
                 Condition("not at(desk7)", lambda: negated(robot.at("desk7"))),
                 Latch("go_to(desk7)", lambda: robot.go_to("desk7"), robot.cancel, keep=False),
             ),
@@ -351,7 +351,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(desk7)",
                 Condition(
                     "(not carrying(vase) or staffed(reception))",
                     lambda: any_of(negated(robot.carrying("vase")), robot.staffed("reception")),

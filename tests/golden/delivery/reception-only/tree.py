@@ -312,7 +312,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(reception)",
                 Condition("not at(reception)", lambda: negated(robot.at("reception"))),
                 Latch(
                     "go_to(reception)",

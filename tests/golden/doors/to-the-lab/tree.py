@@ -322,7 +322,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for open(lab_door)",
                 Condition(
                     "(known locked(lab_door) and locked(lab_door))",
                     lambda: all_of(robot.locked("lab_door") is not None, robot.locked("lab_door")),

@@ -512,7 +512,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(children)",
                 Condition(
                     "not lies_in(insulin,hall)",
                     lambda: negated(robot.lies_in("insulin", "hall")),

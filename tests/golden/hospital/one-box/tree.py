@@ -447,7 +447,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(hall)",
                 Condition(
                     "not lies_in(insulin,pharmacy)",
                     lambda: negated(robot.lies_in("insulin", "pharmacy")),
@@ -491,7 +491,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(landing)",
                 Condition(
                     "not lies_in(insulin,pharmacy)",
                     lambda: negated(robot.lies_in("insulin", "pharmacy")),
@@ -575,7 +575,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(children)",
                 Condition(
                     "not lies_in(insulin,pharmacy)",
                     lambda: negated(robot.lies_in("insulin", "pharmacy")),

@@ -488,7 +488,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(landing)",
                 Condition("on_tray(insulin)", lambda: robot.on_tray("insulin")),
                 Latch(
                     "ride(hall,landing)",
@@ -538,7 +538,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(hall)",
                 Condition(
                     "not lies_in(saline,surgery)",
                     lambda: negated(robot.lies_in("saline", "surgery")),
@@ -563,7 +563,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(hall)",
                 Condition(
                     "(not on_tray(insulin) and not given(saline))",
                     lambda: all_of(
@@ -624,7 +624,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(children)",
                 Condition("on_tray(insulin)", lambda: robot.on_tray("insulin")),
                 Latch(
                     "drive(children_door,landing,children)",
@@ -666,7 +666,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for on_tray(insulin)",
                 Condition("given(saline)", lambda: robot.given("saline")),
                 Latch(
                     "pick_up(insulin,hall)",
@@ -716,7 +716,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(hall)",
                 Condition(
                     "not lies_in(insulin,children)",
                     lambda: negated(robot.lies_in("insulin", "children")),

@@ -325,7 +325,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(pump_hall)",
                 Condition(
                     "known in_range(pressure)",
                     lambda: robot.in_range("pressure") is not None,
@@ -350,7 +350,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for lens_clean()",
                 Condition("not lens_clean()", lambda: negated(robot.lens_clean())),
                 Latch("wipe_lens()", robot.wipe_lens, robot.cancel, keep=False),
             ),

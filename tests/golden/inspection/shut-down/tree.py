@@ -346,7 +346,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for closed(drain)",
                 Condition(
                     "(known closed(drain) and not closed(drain))",
                     lambda: all_of(

@@ -340,7 +340,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(cellar)",
                 Condition("unknown closed(drain)", lambda: robot.closed("drain") is None),
                 Latch(
                     "drive(cellar)",
@@ -351,7 +351,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(pump_hall)",
                 Condition("known closed(drain)", lambda: robot.closed("drain") is not None),
                 Latch(
                     "drive(pump_hall)",

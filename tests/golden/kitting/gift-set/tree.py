@@ -451,7 +451,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for in_view(chocolates)",
                 Condition(
                     "(not gripper_free() or packed(chocolates,crate1))",
                     lambda: any_of(

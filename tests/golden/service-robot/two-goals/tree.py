@@ -366,7 +366,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for near(shelf3)",
                 Condition(
                     "(not near(cupboard4) and not hand_free() and not holding(pl…",
                     lambda: all_of(
@@ -385,7 +385,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(drawer6)",
                 Condition(
                     "(hand_free() and not open(drawer6) and not near(cupboard4))",
                     lambda: all_of(
@@ -422,7 +422,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(shelf3)",
                 Condition(
                     "(known at(cup1,shelf3) and at(cup1,shelf3) and open(cupboar…",
                     lambda: all_of(
@@ -476,7 +476,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for near(shelf3)",
                 Condition(
                     "(not hand_free() and unknown at(book3,cupboard4))",
                     lambda: all_of(
@@ -493,7 +493,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(fridge2)",
                 Condition(
                     "(not holding(book3) and known at(cup1,fridge2) and at(cup1,…",
                     lambda: all_of(
@@ -512,7 +512,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(shelf3)",
                 Condition(
                     "(known at(cup1,fridge2) and not at(cup1,fridge2) and near(f…",
                     lambda: all_of(
@@ -530,7 +530,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(drawer6)",
                 Condition(
                     "(open(drawer6) and holding(book3) and known at(cup1,shelf3)…",
                     lambda: all_of(
@@ -554,7 +554,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for near(cupboard4)",
                 Condition(
                     "(known at(cup1,shelf3) and not at(cup1,shelf3) and not hand…",
                     lambda: all_of(
@@ -573,7 +573,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(cupboard4)",
                 Condition(
                     "(not open(cupboard4) and hand_free())",
                     lambda: all_of(negated(robot.is_open("cupboard4")), robot.hand_free()),
@@ -615,7 +615,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for near(shelf3)",
                 Condition(
                     "(known at(book3,shelf3) and at(book3,shelf3))",
                     lambda: all_of(
@@ -632,7 +632,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(table1)",
                 Condition(
                     "(known at(cup1,table1) and at(cup1,table1) and hand_free() …",
                     lambda: all_of(
@@ -663,7 +663,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for hand_free()",
                 Condition("not open(drawer6)", lambda: negated(robot.is_open("drawer6"))),
                 Latch(
                     "place(book3,shelf3)",
@@ -674,7 +674,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(fridge2)",
                 Condition("near(table1)", lambda: robot.near("table1")),
                 Latch(
                     "walk(fridge2)",
@@ -685,7 +685,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(drawer6)",
                 Condition("not open(drawer6)", lambda: negated(robot.is_open("drawer6"))),
                 Latch(
                     "walk(drawer6)",
@@ -696,7 +696,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(drawer6)",
                 Condition(
                     "(known at(book3,drawer6) and not at(book3,drawer6) and know…",
                     lambda: all_of(
@@ -722,7 +722,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for holding(book3)",
                 Condition(
                     "(known at(book3,drawer6) and not at(book3,drawer6))",
                     lambda: all_of(
@@ -743,7 +743,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for holding(book3)",
                 Condition(
                     "(known at(book3,drawer6) and not at(book3,drawer6))",
                     lambda: all_of(
@@ -764,7 +764,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(cupboard4)",
                 Condition(
                     "(known at(cup1,cupboard4) and at(cup1,cupboard4))",
                     lambda: all_of(
@@ -781,7 +781,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for holding(book3)",
                 Condition(
                     "(known at(book3,drawer6) and not at(book3,drawer6))",
                     lambda: all_of(
@@ -803,7 +803,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(drawer6)",
                 Condition(
                     "(known at(book3,drawer6) and at(book3,drawer6))",
                     lambda: all_of(
@@ -820,7 +820,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(shelf3)",
                 Condition("unknown at(book3,shelf3)", lambda: robot.at("book3", "shelf3") is None),
                 Latch("walk(shelf3)", lambda: robot.walk("shelf3"), robot.cancel, keep=False),
             ),
@@ -832,7 +832,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for near(cupboard4)",
                 Condition(
                     "(known at(book3,cupboard4) and at(book3,cupboard4))",
                     lambda: all_of(
@@ -849,7 +849,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for near(cupboard4)",
                 Condition(
                     "unknown at(book3,cupboard4)",
                     lambda: robot.at("book3", "cupboard4") is None,

@@ -353,7 +353,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for trolley_at(ward)",
                 Condition("strapped(tray3)", lambda: robot.strapped("tray3")),
                 Latch(
                     "push(ward)",

@@ -354,7 +354,7 @@ def create_root(robot: Robot) -> Behaviour:
                         keep=False,
                     ),
                     sequence(
-                        "sequence",
+                        "for at(packing)",
                         Condition("loaded(drill)", lambda: robot.loaded("drill")),
                         Latch(
                             "drive(packing)",
@@ -416,7 +416,7 @@ def create_root(robot: Robot) -> Behaviour:
                         keep=False,
                     ),
                     sequence(
-                        "sequence",
+                        "for at(a1)",
                         Condition("at(packing)", lambda: robot.at("packing")),
                         Latch(
                             "drive(a1)",
@@ -506,7 +506,7 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             sequence(
-                "sequence",
+                "for at(packing)",
                 Condition(
                     "(blocked(a1,a2) or blocked(a2,a1))",
                     lambda: any_of(robot.blocked("a1", "a2"), robot.blocked("a2", "a1")),
@@ -542,7 +542,7 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
+                "for at(a2)",
                 Condition(
                     "(blocked(a1,packing) or blocked(packing,a1))",
                     lambda: any_of(robot.blocked("a1", "packing"), robot.blocked("packing", "a1")),
