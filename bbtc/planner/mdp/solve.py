@@ -107,8 +107,8 @@ def _seeing_all(task: Task, limits: Limits) -> Fraction:
 
 
 def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None:
-    """All of a small space, or the least, by the number of actions, in which a policy reaches the target. None
-    where neither is within reach: with beliefs without end, P* may be what no policy attains."""
+    """All of a small space, or the least, by the number of actions, in which a policy reaches the target.
+    None where neither is within reach: with beliefs without end, P* may be what no policy attains."""
     space = explore_space(task, replace(limits, states=min(limits.states, _FEW_IN_ALL)))
     if space.complete:
         found = max_prob(space, limits)
