@@ -135,6 +135,28 @@ class Exact:
                     belief[successor] = belief.get(successor, 0.0) + p * q
         return found | {"cut": sum(belief.values())}
 
+    def success_from(self, states: Iterable[State], ticks: int) -> dict[State, float]:
+        """The chance of success within a number of ticks from each of these states, if nothing changes by
+        itself: what :meth:`chances` says with a rate of 0, by one iteration for all."""
+        starts: dict[State, Key] = {state: (state, (), (), ()) for state in states}
+        after: dict[Key, list[tuple[float, Key]]] = {}
+        wins: dict[Key, float] = {}
+        waiting = list(starts.values())
+        while waiting:
+            key = waiting.pop()
+            if key not in wins:
+                kind, results = self._ticked(key)
+                wins[key] = float(kind == "success")
+                after[key] = [(chance, successor) for chance, _, successor in results]
+                waiting += [successor for _, successor in after[key]]
+        acting = [(key, ways) for key, ways in after.items() if ways]
+        for _ in range(ticks - 1):
+            now = {key: sum(p * wins[successor] for p, successor in ways) for key, ways in acting}
+            if all(now[key] - wins[key] < 1e-13 for key in now):
+                break
+            wins.update(now)
+        return {state: wins[key] for state, key in starts.items()}
+
     def _ticked(self, key: Key) -> tuple[str, After]:
         if key in self._seen:
             return self._seen[key]
