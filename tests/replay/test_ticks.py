@@ -65,8 +65,8 @@ QUICK = [
     and problem.name != "three-trays"
     and not task_of(problem).components
 ]
-"""Problems for which the strategy that leaves out no condition needs less than a second, and in which no facts
-are hidden: what a robot believes does not change by itself."""
+"""Problems for which the strategy that leaves out no condition needs less than a second, and in which no
+facts are hidden: what a robot believes does not change by itself."""
 
 
 @pytest.mark.parametrize("name", ENGINES)
