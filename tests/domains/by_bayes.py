@@ -6,10 +6,11 @@ A world of a component is the values of its facts. What is believed is the proba
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
+from typing import TypeVar
 
 from bbtc.ground.task import Change, Factor, Observation, Outcome, Task
 from bbtc.replay.script import Values
@@ -18,6 +19,10 @@ from tests.replay.reference import value_of
 Belief = tuple[tuple[Values, Fraction], ...]
 Beliefs = tuple[Belief, ...]
 """What is believed of each component."""
+Sets = tuple[tuple[int, int], ...]
+Reading = tuple[bool | None, ...]
+"""What each observation tells; None where it is not made."""
+_Shows = TypeVar("_Shows", bound=Hashable)
 
 
 @dataclass(frozen=True)
@@ -69,13 +74,13 @@ def _after(task: Task, change: Change, values: Values, belief: Belief) -> Iterat
     """What a change may show, with the belief of its component alone."""
     facts = len(task.components[change.component].facts)
     seen = tuple(values[each] for each in change.seen)
-    told: list[tuple[Fraction, object, Values]] = []
-    costs: dict[object, tuple[Fraction, Fraction]] = {}
+    told: list[tuple[Fraction, tuple[Sets, Reading], Values]] = []
+    costs: dict[tuple[Sets, Reading], tuple[Fraction, Fraction]] = {}
     for world, p in belief:
         for chance, sets, cost, reward in every(change.factors, world + seen):
             after = changed(world + seen, sets)
-            visible = tuple((change.seen[at - facts], value) for at, value in sets if at >= facts)
-            settled = tuple(sorted({at: after[facts + change.seen.index(at)] for at, _ in visible}.items()))
+            both = zip(change.seen, seen, after[facts:], strict=True)
+            settled = tuple((variable, now) for variable, before, now in both if now != before)
             for exact, reading in _readings(change.observations, after):
                 share, shows = p * chance * exact, (settled, reading)
                 told.append((share, shows, after[:facts]))
@@ -83,13 +88,10 @@ def _after(task: Task, change: Change, values: Values, belief: Belief) -> Iterat
                 costs[shows] = paid + share * cost, earned + share * reward
     for shows, chance, found in _sorted_out(told):
         cost, reward = costs[shows]
-        assert isinstance(shows, tuple)
         yield Shown(chance, shows[0], cost / chance, reward / chance, (found,))
 
 
-def _readings(
-    observations: Sequence[Observation], values: Values
-) -> Iterator[tuple[Fraction, tuple[bool | None, ...]]]:
+def _readings(observations: Sequence[Observation], values: Values) -> Iterator[tuple[Fraction, Reading]]:
     """What may be read in a world, with its probability; nothing where it is not looked."""
     ways: list[list[tuple[Fraction, bool | None]]] = []
     for each in observations:
@@ -104,10 +106,10 @@ def _readings(
 
 
 def _sorted_out(
-    told: Sequence[tuple[Fraction, object, Values]],
-) -> Iterator[tuple[object, Fraction, Belief]]:
+    told: Sequence[tuple[Fraction, _Shows, Values]],
+) -> Iterator[tuple[_Shows, Fraction, Belief]]:
     """For each thing shown its probability, and what is believed then."""
-    weights: dict[object, dict[Values, Fraction]] = {}
+    weights: dict[_Shows, dict[Values, Fraction]] = {}
     for share, shows, world in told:
         of = weights.setdefault(shows, {})
         of[world] = of.get(world, Fraction(0)) + share
@@ -135,9 +137,6 @@ def _all(chances: Iterator[Fraction]) -> Fraction:
     for chance in chances:
         found *= chance
     return found
-
-
-Sets = tuple[tuple[int, int], ...]
 
 
 def every(factors: tuple[Factor, ...], values: Values) -> Iterator[tuple[Fraction, Sets, Fraction, Fraction]]:
