@@ -120,20 +120,7 @@ def compile(  # noqa: A001 - the name of the command
 
     Raises :class:`BbtcError` with everything that is wrong, and :class:`LimitReached`.
     """
-    from bbtc import pipeline
-    from bbtc.model.domain import Model
-
-    report = Report() if report is None else report
-    limits = limits or Limits()
-    models = [each for each in inputs if isinstance(each, Model)]
-    if models:
-        if len(inputs) > 1 or problem is not None:
-            raise TypeError("a model stands alone: it holds its domain and its problem")
-        return pipeline.ground_model(models[0], report, limits)
-    sources = _read([each for each in inputs if not isinstance(each, Model)], limits)
-    if not sources:
-        raise TypeError("give a domain and a problem, or a model")
-    return pipeline.task_of_sources(sources, report, limits, Reading(problem, lenient))
+    return _compiled(inputs, limits or Limits(), report, Reading(problem, lenient))
 
 
 def plan(
@@ -176,7 +163,7 @@ def plan(
         raise ValueError("in a closed world trees have no guards")
     options = Options(max_actions, retries, prefer, closed_world or guarded is False, allow_guess)
     tell = progress or (lambda _: None)
-    task = _task(inputs, limits, report, Reading(problem, lenient))
+    task = _task(inputs, limits, report, Reading(problem, lenient, allow_guess))
     return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)
 
 
@@ -198,7 +185,7 @@ def bounds(
     from bbtc.planner.options import Options
 
     limits = limits or Limits(seconds=PLANNING_SECONDS)
-    task = _task(inputs, limits, report, Reading(problem, lenient))
+    task = _task(inputs, limits, report, Reading(problem, lenient, allow_guess))
     options = Options(max_actions=max_actions, allow_guess=allow_guess)
     return task_value(task, limits, options, costs=costs)
 
@@ -423,6 +410,24 @@ def _read(sources: Sequence[Source], limits: Limits | None) -> list[SourceFile]:
     return [s if isinstance(s, SourceFile) else read_source(os.fspath(s), most) for s in sources]
 
 
+def _compiled(
+    inputs: Sequence[Source | Model], limits: Limits, report: Report | None, reading: Reading
+) -> Task:
+    from bbtc import pipeline
+    from bbtc.model.domain import Model
+
+    report = Report() if report is None else report
+    models = [each for each in inputs if isinstance(each, Model)]
+    if models:
+        if len(inputs) > 1 or reading.problem is not None:
+            raise TypeError("a model stands alone: it holds its domain and its problem")
+        return pipeline.ground_model(models[0], report, limits, reading)
+    sources = _read([each for each in inputs if not isinstance(each, Model)], limits)
+    if not sources:
+        raise TypeError("give a domain and a problem, or a model")
+    return pipeline.task_of_sources(sources, report, limits, reading)
+
+
 def _task(
     inputs: Sequence[Source | Model | Task], limits: Limits, report: Report | None, reading: Reading
 ) -> Task:
@@ -431,7 +436,7 @@ def _task(
     tasks = [each for each in inputs if isinstance(each, Task)]
     if not tasks:
         rest = [each for each in inputs if not isinstance(each, Task)]
-        return compile(*rest, problem=reading.problem, lenient=reading.lenient, limits=limits, report=report)
+        return _compiled(rest, limits, report, reading)
     if len(inputs) > 1 or reading.problem is not None:
         raise TypeError("a task stands alone: it holds everything there is to plan for")
     return tasks[0]

@@ -134,6 +134,7 @@ _CODES = (
     Code("BBT0414", "no world is left"),
     Code("BBT0415", "too many worlds"),
     Code("BBT0416", "condition that mixes too much"),
+    Code("BBT0417", "observation that tells nothing", _WARNING),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

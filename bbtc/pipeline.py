@@ -288,7 +288,7 @@ def compile_sources(
         raise BbtcError.single("BBT0006", f"no problem in {names}", hint="give the problem's file, too")
     model = resolve_model(inputs, report, reading, checks=checks)
     try:
-        return ground_model(model, report, limits)
+        return ground_model(model, report, limits, reading)
     except BbtcError:
         if model.goal_span is not None and any(error.code == "BBT0412" for error in report.errors):
             report.retract("BBT0304", model.goal_span)  # the error tells more
@@ -390,13 +390,13 @@ def _with_figures(imported: Imported, source: SourceFile, report: Report, limits
     return replace(tree, success_probability=success, status=status)
 
 
-def ground_model(model: Model, report: Report, limits: Limits) -> Task:
+def ground_model(model: Model, report: Report, limits: Limits, reading: Reading = AS_WRITTEN) -> Task:
     """The ground task of a model with a problem. Raises :class:`BbtcError`."""
     from bbtc.ground.instantiate import ground
 
     task = ground(model, report, limits)
     report.raise_errors()
-    if not task.components:
+    if not task.components or reading.keep_hidden:
         return task
     from bbtc.belief.lowering import lowered
 

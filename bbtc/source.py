@@ -13,11 +13,13 @@ _EXCERPT_WIDTH = 160
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How to read files: which of several problems is meant (by name), and whether names that are declared
-    nowhere are let through where planners read them (``lenient``)."""
+    """How to read files: which of several problems is meant (by name), whether names that are declared
+    nowhere are let through where planners read them (``lenient``), and whether hidden facts stay such where
+    they could be done without (``keep_hidden``), so that a plan can guess them."""
 
     problem: str | None = None
     lenient: bool = False
+    keep_hidden: bool = False
 
 
 AS_WRITTEN = Reading()

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests import profiles as _profiles  # noqa: F401 - loads one
+from tests.sharing import share_in
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # As in a shell's background job. Processes inherit it, and those that tests start shall hear Ctrl-C.
@@ -81,6 +82,12 @@ def _drift(path: str, expected: bytes, actual: bytes) -> str:
 def golden(request: pytest.FixtureRequest) -> Golden:
     """Call it with a path under ``tests/golden/`` and the text or bytes that should stand there."""
     return Golden(bool(request.config.getoption("--update-golden")))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _sharing(tmp_path_factory: pytest.TempPathFactory) -> None:
+    if "PYTEST_XDIST_WORKER" in os.environ:  # else the folder above is that of every test run
+        share_in(tmp_path_factory.getbasetemp().parent)
 
 
 @pytest.fixture(scope="session")

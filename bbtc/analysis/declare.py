@@ -200,6 +200,7 @@ def _predicates(names: Names, domain: ast.Definition) -> None:
                 declared_three_valued=node.three_valued,
                 derived=key in names.derived,
                 external=node.external,
+                observed=node.observed,
                 span=node.name.span,
             )
             if predicate.external and predicate.derived:

@@ -13,13 +13,24 @@ from bbtc.belief.draws import PLACES, Draw, Drawer
 from bbtc.belief.hidden import beliefs_of, compile_change, place_of
 from bbtc.ground.condition import Condition, Is, conjunction, conjuncts, evaluate, variables
 from bbtc.ground.effects import arrange
-from bbtc.ground.task import NO_CHANGE, Charge, Effect, Factor, GroundAction, Outcome, Task
+from bbtc.ground.task import (
+    NO_CHANGE,
+    Change,
+    Charge,
+    Effect,
+    Factor,
+    GroundAction,
+    InitialState,
+    Outcome,
+    Task,
+)
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 
 MOST_BELIEFS = 64
 """A component with more beliefs stays."""
 _MOST_WORLDS = 64
+_LOOK = 4096  # combinations of outcomes between two looks at the clock
 _MOST_SEEN = 16  # combinations of values of the seen variables of a change
 
 
@@ -27,10 +38,16 @@ def lowered(task: Task, limits: Limits) -> Task:
     """The task without the components that can do without worlds. P*, costs and trees are the same, state by
     state. Raises :class:`bbtc.diagnostics.LimitReached`."""
     found = {}
+    count = len(task.initial)
+    changes: list[list[tuple[GroundAction, Change]]] = [[] for _ in task.components]
+    for action in task.actions:
+        for change in action.changes:
+            changes[change.component].append((action, change))
     for number in range(len(task.components)):
         limits.check_time("grounding")
-        lowering = _Lowering(task, number, limits)
-        if lowering.explored():
+        lowering = _Lowering(task, number, changes[number], limits)
+        if lowering.explored() and count * lowering.beginnings <= limits.initial_states:
+            count *= lowering.beginnings
             found[number] = lowering
     return _without(task, found) if found else task
 
@@ -57,42 +74,72 @@ class _Doing:
 
 
 class _Lowering:
-    def __init__(self, task: Task, number: int, limits: Limits) -> None:
+    def __init__(
+        self, task: Task, number: int, changes: list[tuple[GroundAction, Change]], limits: Limits
+    ) -> None:
         self._task = task
+        self._number = number
         self._component = task.components[number]
         self._limits = limits
         self._beliefs = beliefs_of(self._component)
         self._known = [knowledge.variable for knowledge in self._component.known]
         self._place = place_of(task, number)
         own = set(self._known)
+        self._work = 0
+        self._drawers: dict[Change, Drawer] = {}
         self._doings = [
             _Doing(
                 action,
                 change.seen,
-                compile_change(task, change, self._spend),
+                self._drawer(change),
                 [
                     part
                     for part in conjuncts(action.precondition)
                     if own.issuperset(variables(part)) and any(True for _ in variables(part))
                 ],
             )
-            for action in task.actions
-            for change in action.changes
-            if change.component == number
+            for action, change in changes
         ]
         self._met: dict[int, tuple[Truth, ...]] = {}
         """By belief: the values of what is known."""
+        self.first: list[dict[Draw, Fraction]] = []
+        """By initial state: what may be told before the first action."""
 
-    def _spend(self, _work: int, _found: int) -> None:
-        self._limits.check_time("grounding")
+    @property
+    def beginnings(self) -> int:
+        """So many things may be told before the first action."""
+        return max(map(len, self.first))
+
+    def _told_first(self, state: InitialState) -> dict[Draw, Fraction]:
+        """What may be told before the first action."""
+        values = self._values(self._beliefs.prior)
+        values[: len(state.values)] = bytes(state.values)
+        change = Change(self._number, self._component.seen, (), self._component.first)
+        return compile_change(self._task, change, self._spend)(bytes(values))
+
+    def _spend(self, work: int, _found: int) -> None:
+        self._work += work
+        if self._work > _LOOK:
+            self._work = 0
+            self._limits.check_time("grounding")
+
+    def _drawer(self, change: Change) -> Drawer:
+        """The change as a function of the state; many actions have the same, by their sensors."""
+        if change not in self._drawers:
+            self._drawers[change] = compile_change(self._task, change, self._spend)
+        return self._drawers[change]
 
     def explored(self) -> bool:
         """Look at all beliefs; are they few, and does what is known tell them apart?"""
-        if len(self._component.prior) > _MOST_WORLDS or self._component.first:
+        if len(self._component.prior) > _MOST_WORLDS:
             return False
         if any(2 ** len(doing.seen) > _MOST_SEEN for doing in self._doings):
             return False
-        waiting = [self._meet(self._beliefs.prior)]
+        for state in self._task.initial:
+            self.first.append(self._told_first(state))
+        waiting = list(dict.fromkeys(belief for told in self.first for belief in map(self._after, told)))
+        for belief in waiting:
+            self._meet(belief)
         while waiting:
             belief = waiting.pop()
             for doing in self._doings:
@@ -217,9 +264,26 @@ def _without(task: Task, found: dict[int, _Lowering]) -> Task:
     return replace(
         task,
         variables=tuple(seen),
+        initial=tuple(
+            each
+            for number, state in enumerate(task.initial)
+            for each in _told(state, [lowering.first[number] for lowering in found.values()])
+        ),
         actions=actions,
         components=tuple(task.components[number] for number in left),
     )
+
+
+def _told(state: InitialState, draws: list[dict[Draw, Fraction]]) -> Iterator[InitialState]:
+    """What an initial state becomes by what is told of several components."""
+    for combined in product(*(draw.items() for draw in draws)):
+        values, probability = list(state.values), state.probability
+        for (delta, _, _), share in combined:
+            probability *= share
+            for variable, value in delta:
+                if variable < len(values):
+                    values[variable] = Truth(value)
+        yield InitialState(probability, tuple(values))
 
 
 def _action(action: GroundAction, more: Iterable[Factor], renumber: dict[int, int]) -> GroundAction:

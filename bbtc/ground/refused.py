@@ -13,6 +13,8 @@ from bbtc.model import formula as mf
 
 _START = "facts, `(unknown …)`, `(probabilistic …)`, `(oneof …)` and `(or …)` can"
 
+_FACTS = "the robot knows what it knows: `(unknown …)` and `(known …)` belong into conditions"
+
 
 def refused(model: md.Model) -> Iterator[Diagnostic]:
     """An error for every construct of a model that grounding has no counterpart for."""
@@ -24,12 +26,19 @@ def refused(model: md.Model) -> Iterator[Diagnostic]:
                 schema.observe_span,
                 "a noisy reading is written `(probabilistic q (p))`: right with q, whichever the truth",
             )
+        elif (
+            schema.observe is not None
+            and not isinstance(schema.observe, me.Choice)
+            and any(map(_is_test, mf.readings(schema.observe)))
+        ):
+            message = f"`:observe` of action `{schema.name}` tells of facts, not of what is known"
+            yield Diagnostic("BBT0406", message, schema.observe_span, _FACTS)
     for sensor in model.sensors:
-        yield Diagnostic("BBT0407", f"sensor `{sensor.name}` cannot be grounded yet", sensor.span)
+        if any(map(_is_test, mf.readings(sensor.sensed))):
+            message = f"sensor `{sensor.name}` tells of facts, not of what is known"
+            yield Diagnostic("BBT0407", message, sensor.span, _FACTS)
     for clause in model.init.clauses:
-        if clause.invariant:
-            yield Diagnostic("BBT0405", "`invariant` in `:init` cannot be grounded yet", clause.span, _START)
-        elif any(_is_no_fact(model, reading) for reading in mf.readings(clause.condition)):
+        if any(_is_no_fact(model, reading) for reading in mf.readings(clause.condition)):
             message = "a condition in `:init` tells of facts, not of what is known or derived"
             yield Diagnostic("BBT0405", message, clause.span, _START)
     if model.problem is not None and model.goal is None:
@@ -50,5 +59,14 @@ def noise(observed: me.Choice) -> tuple[me.Set, Fraction] | None:
 
 
 def _is_no_fact(model: md.Model, reading: mf.Reading) -> bool:
-    tested = reading.value is None or reading.value is Truth.UNKNOWN
-    return tested or model.predicates[reading.atom.predicate].derived
+    return _is_test(reading) or model.predicates[reading.atom.predicate].derived
+
+
+def _observed(schema: md.Schema) -> Iterator[mf.Reading]:
+    """The facts that an action tells exactly."""
+    if schema.observe is not None and not isinstance(schema.observe, me.Choice):
+        yield from mf.readings(schema.observe)
+
+
+def _is_test(reading: mf.Reading) -> bool:
+    return reading.value is None or reading.value is Truth.UNKNOWN

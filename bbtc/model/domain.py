@@ -22,7 +22,7 @@ from bbtc.source import Span
 @dataclass(frozen=True, slots=True)
 class Predicate:
     """A predicate. ``three_valued`` if anything in the model can make it unknown; ``external`` if it is
-    declared as one that others change."""
+    declared as one that others change, ``observed`` as one whose facts are always seen."""
 
     name: str
     parameters: tuple[Parameter, ...]
@@ -30,6 +30,7 @@ class Predicate:
     declared_three_valued: bool = False
     derived: bool = False
     external: bool = False
+    observed: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
     inferred: bool = field(default=False, compare=False, repr=False)
     """Nothing declares it; it is known from its use."""

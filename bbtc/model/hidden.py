@@ -8,10 +8,11 @@ from bbtc.model import effect as me
 
 def has_hidden_state(model: md.Model) -> bool:
     """Whether facts of the model may be true without being known: an action has ``:observe``, there is a
-    sensor, or ``:init`` has a ``oneof`` or a clause such as ``(or …)``. In all other models a fact is
-    unknown where an effect or ``:init`` says so, and nothing is hidden behind it."""
+    sensor, a predicate is ``observed``, or ``:init`` has a ``oneof`` or a clause such as ``(or …)``. In all
+    other models a fact is unknown where an effect or ``:init`` says so, and nothing is hidden behind it."""
     return (
         bool(model.sensors or model.init.clauses)
+        or any(predicate.observed for predicate in model.predicates.values())
         or any(schema.observe is not None for schema in model.schemas.values())
         or any(map(has_oneof, model.init.choices))
     )

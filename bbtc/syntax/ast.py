@@ -351,13 +351,15 @@ class TypedSection:
 @dataclass(frozen=True, slots=True)
 class PredicateDeclaration:
     """``(name params)`` within ``:predicates``; ``(unknown (name params))`` declares it three-valued,
-    ``(external …)`` around either of these as one that others change."""
+    ``(external …)`` around either of these as one that others change, ``(observed …)`` as one whose facts
+    are always seen."""
 
     name: Name
     parameters: TypedList
     three_valued: bool
     span: Span = _span()
     external: bool = False
+    observed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

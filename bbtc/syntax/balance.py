@@ -30,9 +30,9 @@ _SECTIONS = frozenset(
     )
 )
 _FIELDS = {
-    ":action": frozenset((":parameters", ":precondition", ":observe", ":effect")),
+    ":action": frozenset((":parameters", ":precondition", ":observe", ":sensing-model", ":effect")),
     ":template": frozenset((":parameters", ":precondition", ":effect", ":body")),
-    ":sensor": frozenset((":parameters", ":condition", ":sensed")),
+    ":sensor": frozenset((":parameters", ":condition", ":sense", ":sensed")),
     ":axiom": frozenset((":parameters", ":vars", ":context", ":body", ":implies", ":head")),
 }
 

@@ -198,6 +198,9 @@ class Builder(Expressions):
     def external(self, head: Token, predicate: _Predicate, close: Token) -> _Predicate:
         return replace(predicate, external=True, span=head.to(close))
 
+    def observed(self, head: Token, predicate: _Predicate, close: Token) -> _Predicate:
+        return replace(predicate, observed=True, span=head.to(close))
+
     def functions(self, head: Token, declarations: list[_Function], close: Token) -> ast.Functions:
         return ast.Functions(tuple(declarations), head.to(close))
 
@@ -272,6 +275,10 @@ class Builder(Expressions):
     def observe_agent(self, keyword: Token, _agent: Token, _formula: ast.Formula) -> Observe:
         message = "`:observe-agent`, an observation by one of several agents, is not supported"
         raise Misuse("BBT0212", message, keyword.span)
+
+    def sensing_model(self, keyword: Token, _effect: ast.Effect) -> Observe:
+        message = "`:sensing-model`, in which an action tells of declared variables, is not supported"
+        raise Misuse("BBT0212", message, keyword.span, "say `:observe` of the facts that it tells")
 
     derived_head = DerivedHead
 
@@ -369,7 +376,8 @@ class Builder(Expressions):
     # --- what is refused by name -------------------------------------------------------------
 
     def unsupported_section(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
-        return unsupported(keyword(head), head, close)
+        word = keyword(head)
+        return unsupported(":axiom NAME" if word == ":axiom" else word, head, close)
 
 
 def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: bool = False) -> _Predicate:

@@ -191,7 +191,13 @@ class _Docs:
 
     def predicate(self, node: ast.PredicateDeclaration) -> Doc:
         marks = [
-            word for word, given in (("external", node.external), ("unknown", node.three_valued)) if given
+            word
+            for word, given in (
+                ("external", node.external),
+                ("observed", node.observed),
+                ("unknown", node.three_valued),
+            )
+            if given
         ]
         spans: list[Span | None] = [node.span]
         for _ in marks:

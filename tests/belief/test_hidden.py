@@ -19,6 +19,7 @@ from bbtc.ground.task import Observation, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.fully_observable import fully_observable
+from bbtc.source import SourceFile
 from tests.belief.hidden_tasks import part, search, tiger
 
 LIMITS = Limits()
@@ -186,3 +187,17 @@ def test_who_sees_the_world_does_no_worse() -> None:
         for actions in range(1, 5):
             best = bbtc.bounds(task, max_actions=actions).upper
             assert best <= bbtc.bounds(seeing, max_actions=actions).lower
+
+
+def test_a_guess_is_allowed_where_hidden_facts_could_be_done_without() -> None:
+    """Of a coin that nobody sees, heads are guessed half the time, or turned up for nothing."""
+    text = SourceFile(
+        "coin.pddl",
+        "(define (domain coin) (:predicates (heads) (tails))"
+        " (:action look :precondition (tails) :observe (heads)))"
+        "(define (problem one) (:domain coin) (:init (oneof (heads) (tails))) (:goal (heads)))",
+    )
+    assert bbtc.bounds(text).upper == 0
+    assert bbtc.bounds(text, allow_guess=True).upper == Fraction(1, 2)
+    plan = bbtc.plan(text, target=Fraction(1, 2), allow_guess=True)
+    assert plan.tree.success_probability == plan.figures.mistaken == Fraction(1, 2)

@@ -140,9 +140,9 @@ NOT_YET = """(define (domain look)
   (:predicates (unknown (seen)) (here) (there))
   (:action look :precondition (unknown (seen)) :observe (probabilistic 0.9 (and (seen) (here))))
   (:action go :precondition (here) :effect (there))
-  (:sensor eye :sensed (here)))
+  (:sensor eye :sensed (known (here))))
 (define (problem p) (:domain look)
-  (:init (unknown (seen)) (oneof (here) (there)) (invariant (here) (there)))
+  (:init (unknown (seen)) (oneof (here) (there)) (or (unknown (here)) (there)))
   (:metric minimize (total-cost)))
 """
 
@@ -292,7 +292,7 @@ def test_a_goal_too_large_to_look_into_is_judged_by_predicates_alone(
 def test_a_goal_of_what_cannot_be_compiled_yet_is_judged_by_predicates_alone(tmp_path: Path) -> None:
     domain = """(define (domain d) (:requirements :typing :unknown) (:predicates (shut) (done) (other))
       (:action look :precondition (unknown (shut)) :observe (shut))
-      (:sensor eye :sensed (shut))
+      (:sensor eye :sensed (known (shut)))
       (:action act :precondition (shut) :effect (done)))
       (define (problem x) (:domain d) (:init (unknown (shut))) (:goal {}))"""
     for goal, warned in (("(done)", False), ("(other)", True)):

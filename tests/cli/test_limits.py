@@ -76,7 +76,7 @@ def test_a_hundred_thousand_nested_conjunctions(tmp_path: Path) -> None:
 @pytest.mark.parametrize("condition", ["(and {})", "(and)", "(or {})"])
 def test_twelve_parameters_over_a_thousand_objects(tmp_path: Path, condition: str) -> None:
     file = _wide(tmp_path / "wide.pddl", 12, 1000, condition)
-    done = _run("compile", str(file), "--time-limit", "5", "-o", str(tmp_path / "task.json"))
+    done = _run("compile", str(file), "--time-limit", "2", "-o", str(tmp_path / "task.json"))
     assert done.returncode == 3
     assert "BBT0007" in done.stderr
 
@@ -84,7 +84,7 @@ def test_twelve_parameters_over_a_thousand_objects(tmp_path: Path, condition: st
 def test_a_condition_that_no_objects_meet_takes_no_time_to_refute(tmp_path: Path) -> None:
     """Every object has `p`, so none of the thousand to the twelfth bindings is worth a look."""
     file = _wide(tmp_path / "wide.pddl", 12, 1000, "(not (and {}))")
-    done = _run("compile", str(file), "--time-limit", "5", "-o", str(tmp_path / "task.json"))
+    done = _run("compile", str(file), "--time-limit", "2", "-o", str(tmp_path / "task.json"))
     assert done.returncode == 1
     assert "BBT0412" in done.stderr
     assert "no action ever achieves `(done)`" in done.stderr

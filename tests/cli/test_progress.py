@@ -84,7 +84,10 @@ def test_bounds_close_before_the_eyes(problem: str) -> None:
     assert screen(shown) == []
 
 
-def test_messages_stand_on_lines_of_their_own(problem: str) -> None:
+def test_messages_stand_on_lines_of_their_own(tmp_path: Path) -> None:
+    file = tmp_path / "coins.pddl"
+    file.write_text(coins(4))
+    problem = str(file)
     shown, _ = on_terminal("plan", problem, "--strategy", "policy", "--target", "0.01", "-o", os.devnull)
     piped = subprocess.run(
         [sys.executable, "-c", _EAGER, "plan", problem, "--strategy", "policy", "--target", "0.01"],

@@ -7,7 +7,7 @@ import inspect
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
 from bbtc.planner.result import Plan
 from bbtc.syntax.reader import read_source
+from tests.sharing import shared
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -66,10 +67,21 @@ def task_of(problem: Problem) -> Task:
     return compile_sources(sources, Report(), Limits())
 
 
-@functools.cache
 def plan_of(problem: Problem, strategy: str | None = None) -> Plan:
-    """The plan for the problem's own target, by the problem's own strategy unless another is given."""
-    return plan_task(task_of(problem), None, strategy or problem.strategy, Limits(), lambda _: None)
+    """The plan for the problem's own target, by the problem's own strategy unless another is given: made
+    once, whichever worker of the test run asks first."""
+    return _plan_of(problem, strategy or problem.strategy)
+
+
+@functools.cache
+def _plan_of(problem: Problem, strategy: str) -> Plan:
+    task = task_of(problem)
+    plan = shared(
+        f"{problem.domain}-{problem.name}-{strategy}",
+        lambda: plan_task(task, None, strategy, Limits(), lambda _: None),
+    )
+    assert plan.tree.task == task
+    return replace(plan, tree=replace(plan.tree, task=task))
 
 
 # --- the command line ------------------------------------------------------------------------
@@ -111,8 +123,8 @@ def bbtc(*arguments: str, stdin: bytes | None = None) -> Done:
 EXPORTS = {"tree.dot": "dot", "tree.xml": "btcpp", "tree.py": "py_trees"}
 
 
-def artefacts(problem: Problem) -> dict[str, bytes]:
-    """Every artefact of a problem, by file name."""
+def artefacts(problem: Problem, *, saved: bool = False) -> dict[str, bytes]:
+    """Every artefact of a problem, by file name; ``saved``: planned from the compiled task."""
     made: dict[str, bytes] = {}
 
     def run(*arguments: str, stdin: bytes | None = None) -> Done:
@@ -121,7 +133,9 @@ def artefacts(problem: Problem) -> dict[str, bytes]:
         return done
 
     made["task.json"] = run("compile", *problem.files).out
-    planned = run("plan", *problem.files, *problem.switches)
+    source = ["-"] if saved else problem.files
+    # Without the usual limit of a minute, which a busy machine may exceed.
+    planned = run("plan", *source, *problem.switches, "--time-limit", "none", stdin=made["task.json"])
     made["tree.json"], made["plan.txt"] = planned.out, planned.err.encode()
     for name, form in EXPORTS.items():
         made[name] = run("export", "-", "--to", form, stdin=planned.out).out

@@ -19,7 +19,7 @@ _GROUP = 100
 _STATES = 12
 
 
-@pytest.mark.parametrize("group", range(amount(5, 200)))
+@pytest.mark.parametrize("group", range(amount(3, 200)))
 def test_preconditions_and_goals_are_worth_what_the_text_says_in_every_state(group: int) -> None:
     """True, false or unknown, whatever value others give to what effects mention or is declared external."""
     compared = 0

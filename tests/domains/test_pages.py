@@ -18,7 +18,7 @@ from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ConditionNode, ControlNode, Node, walk
-from tests.conftest import Golden
+from tests.conftest import GOLDEN, Golden
 from tests.domains.constructs import users
 from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc, plan_of, task_of
 
@@ -51,9 +51,12 @@ def tree(problem: Problem) -> str:
     return fenced(outline(task_of(problem), plan_of(problem).tree.root))
 
 
-def plan(problem: Problem) -> str:
-    """What ``bbtc plan`` tells about its refinements."""
-    lines = bbtc("plan", *problem.files, *problem.switches).err.splitlines()
+def plan(problem: Problem, anew: bool) -> str:
+    """What ``bbtc plan`` tells about its refinements: what it told when its golden file was written, or tells
+    now."""
+    golden = (GOLDEN / str(problem) / "plan.txt").read_text(encoding="utf-8")
+    text = bbtc("plan", *problem.files, *problem.switches).err if anew else golden
+    lines = text.splitlines()
     last = next(number for number, line in enumerate(lines) if line.startswith("target "))
     return fenced("".join(f"{line}\n" for line in lines[: last + 1]))  # warnings follow
 
@@ -92,13 +95,13 @@ def constructs() -> str:
     return "\n" + "".join(f"{row}\n" for row in rows) + "\n"
 
 
-def made(kind: str, what: str) -> str:
+def made(kind: str, what: str, anew: bool) -> str:
     """What belongs between the marks."""
     match kind:
         case "tree":
             return tree(Problem(*what.split("/")))
         case "plan":
-            return plan(Problem(*what.split("/")))
+            return plan(Problem(*what.split("/")), anew)
         case "figures":
             return figures(what)
         case "constructs":
@@ -111,7 +114,11 @@ def made(kind: str, what: str) -> str:
 def test_what_a_page_shows_is_what_bbtc_says(page: str, golden: Golden) -> None:
     file = PAGES / f"{page}.md"
     text = file.read_text(encoding="utf-8")
-    now = MADE.sub(lambda m: f"{m[1]}{': ' + m[2] if m[2] else ''} -->\n{made(m[1], m[2] or '')}", text)
+
+    def now_of(m: re.Match[str]) -> str:
+        return f"{m[1]}{': ' + m[2] if m[2] else ''} -->\n{made(m[1], m[2] or '', golden.update)}"
+
+    now = MADE.sub(now_of, text)
     assert text.count("<!-- end -->") == len(MADE.findall(text)) > 0
     if golden.update and now != text:
         file.write_text(now, encoding="utf-8")

@@ -120,12 +120,12 @@ def _refused(model: Model) -> bool:
 
 def test_a_check_warns_about_just_the_goals_that_planning_refuses() -> None:
     warned = 0
-    for seed in range(amount(200, 4000)):
+    for seed in range(amount(100, 4000)):
         model = model_of(random_text(seed))
         doubts = _doubts(model)
         assert bool(doubts) == _refused(model), seed
         warned += bool(doubts)
-    assert warned > amount(200, 4000) / 50, "there are such goals"
+    assert warned > amount(100, 4000) / 50, "there are such goals"
 
 
 def _given(model: Model, missing: tuple[Missing, ...]) -> Model | None:
@@ -151,7 +151,7 @@ def test_to_give_what_is_missing_puts_the_goal_within_reach() -> None:
     """On random texts: whatever is told as the root of a goal out of reach, if it is given, the goal is
     not refused any more, or for want of something else, deeper down."""
     mended = tried = 0
-    for seed in range(amount(400, 8000)):
+    for seed in range(amount(200, 8000)):
         model = model_of(random_text(seed))
         if not _refused(model):
             continue

@@ -9,6 +9,7 @@ import pytest
 
 import bbtc
 from bbtc import pipeline
+from bbtc.belief.lowering import lowered
 from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
@@ -112,6 +113,85 @@ def test_noise_tells_nothing_for_sure() -> None:
     assert observation.accuracy == Fraction(17, 20)
 
 
+CAVE = """(define (domain cave) (:types cell)
+  (:predicates (at ?c - cell) (joined ?a ?b - cell) (pit ?c - cell) (breeze ?c - cell))
+  (:action walk :parameters (?a ?b - cell)
+    :precondition (and (at ?a) (joined ?a ?b) (not (pit ?b))) :effect (and (not (at ?a)) (at ?b)))
+  (:sensor skin :parameters (?c - cell) :condition (at ?c) :sense (breeze ?c)))
+(define (problem x) (:domain cave) (:objects m l r e - cell)
+  (:init (at m) (joined m l) (joined m r) (joined l e) (joined r e) {}) (:goal (at e)))"""
+
+
+@pytest.mark.parametrize(
+    ("init", "expected"),
+    [
+        # The breeze at the mouth tells at the start which way is safe.
+        ("(oneof (and (pit l) (breeze m)) (pit r))", (1, 2)),
+        # Nothing tells: no way is known to be safe, and no walk may start.
+        ("(oneof (and (pit l) (breeze l)) (pit r))", (0, 0)),
+        # The breeze is felt at the right, which is safe, and tells nothing of use there.
+        ("(unknown (breeze r)) (pit l)", (1, 2)),
+        # With 1/2 the breeze at the mouth tells that the left is safe.
+        ("(oneof (breeze m) (and (pit l) (pit r)))", (Fraction(1, 2), None)),
+    ],
+)
+def test_sensors_tell_at_the_start_and_where_the_robot_comes(
+    init: str, expected: tuple[Fraction, Fraction | None]
+) -> None:
+    for task in (task_of(CAVE.format(init)), lowered(task_of(CAVE.format(init)), Limits())):
+        probability, cost = best(task)
+        assert probability == expected[0]
+        assert expected[1] is None or cost == expected[1]
+
+
+def test_a_sensor_is_read_after_each_action_that_may_change_what_it_reads() -> None:
+    """A scale tells of the bag whenever something was put in; one of the two stones is heavy."""
+    text = """(define (domain d) (:types stone) (:predicates (heavy ?s - stone) (in ?s - stone) (down) (done))
+      (:action put :parameters (?s - stone) :precondition (not (in ?s))
+        :effect (and (in ?s) (when (heavy ?s) (down))))
+      (:sensor scale :sensed (down))
+      (:action keep :parameters (?s - stone) :precondition (and (heavy ?s) (in ?s)) :effect (done)))
+      (define (problem x) (:domain d) (:objects a b - stone)
+        (:init (oneof (heavy a) (heavy b))) (:goal (done)))"""
+    # put a; keep a, or put b and keep b.
+    assert best(task_of(text)) == (1, Fraction(5, 2))
+
+
+PUSH = """(define (domain d) (:predicates (jammed) {} (in))
+  (:action push :effect (when (not (jammed)) (open)))
+  (:action oil :effect (not (jammed)))
+  (:action enter :precondition (open) :effect (in)))
+(define (problem x) (:domain d) (:init (unknown (jammed))) (:goal (in)))"""
+
+
+def test_a_fact_that_is_always_seen_tells_what_changed_it() -> None:
+    """A door that did not open is jammed; where nobody sees it, one cannot know."""
+    seen = task_of(PUSH.format("(observed (open))"))
+    # push; enter, or oil, push and enter.
+    assert best(seen) == (1, 3)
+    without_oil = PUSH.replace("(:action oil :effect (not (jammed)))", "")
+    assert best(task_of(without_oil.format("(observed (open))")))[0] == Fraction(1, 2)
+    unseen = without_oil.format("(open)").replace(
+        "(:action push", "(:action look :observe (in)) (:action push"
+    )
+    assert best(task_of(unseen))[0] == 0
+
+
+def test_what_may_have_two_reasons_tells_of_none_for_sure() -> None:
+    """The lamp is on where the bulb was changed with success, or by chance: it tells nothing for sure."""
+    text = """(define (domain d) (:predicates (good) (lit) (w) (done))
+      (:action look :observe (w))
+      (:action spoil :effect (not (good)))
+      (:action change :precondition (not (good))
+        :effect (and (probabilistic 1/2 (and (good) (lit))) (probabilistic {} (lit))))
+      (:action claim :precondition (good) :effect (done)))
+      (define (problem x) (:domain d) (:init (unknown (good)) (unknown (w))) (:goal (done)))"""
+    for other, expected in (("0", 1), ("1/3", 0), ("1", 0)):
+        task = task_of(text.format(other))
+        assert bbtc.bounds(task).upper == expected
+        assert bbtc.bounds(lowered(task, Limits())).upper == expected
+
+
 def test_a_fact_made_unknown_is_drawn_anew() -> None:
     text = """(define (domain d) (:predicates (heads) (won))
       (:action toss :effect (unknown (heads)))
@@ -120,6 +200,11 @@ def test_a_fact_made_unknown_is_drawn_anew() -> None:
       (define (problem x) (:domain d) (:init (unknown (heads))) (:goal (won)))"""
     # look, and with 1/2 toss and look again: x = 1 + 1/2 · 1 + 1/2 (1 + x).
     assert best(task_of(text)) == (1, 4)
+    # With a draw of its own of 1/3: x = 1 + 1/3 + 2/3 (1 + x).
+    biased = text.replace("(unknown (heads))) (:goal", "(probabilistic 1/3 (heads))) (:goal")
+    assert best(task_of(biased)) == (1, 6)
+    # A coin that shows tails at first has to be tossed: 1 + x.
+    assert best(task_of(text.replace("(unknown (heads))) (:goal", ") (:goal"))) == (1, 5)
 
 
 def test_domains_without_hidden_state_keep_their_meaning() -> None:

@@ -22,8 +22,8 @@ from tests.replay.random_trees import busy_tree, random_tree
 from tests.replay.reference import expected_ticks
 from tests.replay.ticks import TickWorld, random_script, trace
 
-MUTANTS = amount(600, 20_000)
-RUN = amount(800, 40_000)
+MUTANTS = amount(300, 20_000)
+RUN = amount(400, 40_000)
 """Changed files whose behaviour is compared with the engine's, if they are read."""
 
 Parents = dict[ET.Element, ET.Element]

@@ -108,7 +108,7 @@ ALL_OPTIONS = [
 
 def test_labels_that_look_like_something_else_come_back() -> None:
     found = seed = 0
-    while found < amount(120, 5000):
+    while found < amount(60, 5000):
         seed += 1
         rng = random.Random(seed)
         tree = labelled(random_tree(seed, latched=0.6, depth=rng.choice([2, 3, 4])), rng)
@@ -150,7 +150,7 @@ def test_without_notes_all_but_ids_and_claims_comes_back() -> None:
             assert ids == [f"n{number + 1}" for number in range(len(ids))]
 
 
-@examples(150)
+@examples(amount(60, 150))
 @given(trees(HOSTILE_NAMES))
 def test_hostile_names_and_labels_come_back(tree: Tree) -> None:
     if not is_sound(tree):

@@ -19,9 +19,10 @@ from bbtc.belief.simulate import Figures
 from bbtc.disturbance.perturbed import PerturbedRuns, perturbed_runs
 from bbtc.disturbance.recovery import Recovery, recovery
 from bbtc.limits import Limits
+from bbtc.planner.strategies import DEFAULT
 from bbtc.rewrite.simplify import size
 from bbtc.tree.nodes import Tree
-from tests.domains.problems import PROBLEMS, REPOSITORY, Problem, task_of
+from tests.domains.problems import PROBLEMS, REPOSITORY, Problem, plan_of, task_of
 
 Author: TypeAlias = Literal["by hand", "planned"]
 AUTHORS: tuple[Author, ...] = ("by hand", "planned")
@@ -54,7 +55,7 @@ def tree_of(problem: Problem, author: Author) -> Tree:
         tree = bbtc.import_tree(file_of(problem), *(REPOSITORY / file for file in problem.files))
         assert tree.task == task_of(problem)
         return tree
-    return bbtc.plan(task_of(problem)).tree
+    return plan_of(problem, DEFAULT).tree
 
 
 def nodes_of(problem: Problem, author: Author) -> int:

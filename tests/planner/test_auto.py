@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
 from itertools import product
 
 import pytest
@@ -52,6 +53,13 @@ def plan(
     return done
 
 
+@cache
+def told(problem: Problem) -> tuple[Plan, tuple[Refinement, ...]]:
+    """The plan of a problem, and the refinements that were told."""
+    steps: list[Refinement] = []
+    return plan(task_of(problem), "auto", None, steps), tuple(steps)
+
+
 def size(of: Plan) -> int:
     return sum(1 for _ in walk(of.tree.root))
 
@@ -84,7 +92,7 @@ def from_elsewhere(of: Task, done: Plan) -> Elsewhere:
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
     of = task_of(problem)
-    done, small = plan(of, "auto"), plan(of, "auto", prefer="size")
+    done, small = told(problem)[0], plan(of, "auto", prefer="size")
     assert done.tree.status == small.tree.status == "target-reached"
     most = 110 if problem.domain == "hospital" else 80
     assert size(small) <= min(most, size(plan(of, "search", prefer="size")))
@@ -96,9 +104,8 @@ def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_the_refinements_told_are_those_of_the_tree_that_is_kept(problem: Problem) -> None:
-    steps: list[Refinement] = []
-    done = plan(task_of(problem), "auto", None, steps)
-    assert tuple(steps) == done.refinements
+    done, steps = told(problem)
+    assert steps == done.refinements
     if steps:
         assert steps[-1].success >= done.tree.target
 

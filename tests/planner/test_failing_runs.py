@@ -24,6 +24,7 @@ from bbtc.planner.failing_runs import failing_runs
 from bbtc.planner.why_not import Block, RootFinder
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree
 from tests.domains.problems import bbtc
+from tests.long_form import amount
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import trees
@@ -202,7 +203,7 @@ def _all_runs(chain: Chain, most: int) -> Iterator[tuple[Fraction, int]]:
         todo.extend((probability * p, after) for after, p in successors.items())
 
 
-@examples(80)
+@examples(amount(40, 80))
 @given(trees())
 def test_the_failing_runs_are_those_of_the_plain_enumeration(tree: Tree) -> None:
     chain = explore(tree.task, tree.root, Limits())
@@ -219,7 +220,7 @@ def test_the_failing_runs_are_those_of_the_plain_enumeration(tree: Tree) -> None
     assert sum((run.probability for run in listed), Fraction(0)) == found.failure + found.blocked
 
 
-@examples(80)
+@examples(amount(40, 80))
 @given(trees())
 def test_with_what_it_lacks_given_the_goal_is_in_reach_again(tree: Tree) -> None:
     """Of whatever state: where parts of the goal are lost, setting the facts named takes that back."""

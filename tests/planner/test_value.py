@@ -24,6 +24,7 @@ from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.policy_iteration import Equations
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.mdp.state_space import StateSpace
+from tests.long_form import amount
 from tests.planner.examples import Optimum, cases, corpus_optima
 from tests.planner.test_refine import action, task
 from tests.planner.test_space import by_simulator
@@ -53,7 +54,7 @@ def test_cases_have_their_listed_values(case: Optimum) -> None:
         assert float(within.initial[budget].lower) == pytest.approx(expected, abs=6e-7)
 
 
-@pytest.mark.parametrize("problem", corpus_optima(), ids=lambda c: c.name)
+@pytest.mark.parametrize("problem", corpus_optima()[:: amount(2, 1)], ids=lambda c: c.name)
 def test_public_problems_have_their_listed_values(problem: Optimum) -> None:
     try:
         of = problem.task()
@@ -108,7 +109,7 @@ def after_steps(of: Task, choices: Choices, steps: int) -> dict[Values, Fraction
     return value
 
 
-@examples(200)
+@examples(amount(100, 200))
 @given(of=tasks())
 def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task) -> None:
     """A value that a policy attains and that solves the optimality inequalities is P*."""
@@ -140,7 +141,7 @@ def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task)
     assert solve(rows_of, [wins[s] for s in positive]) == [values[s] for s in positive]
 
 
-@examples(100)
+@examples(amount(50, 100))
 @given(of=tasks())
 def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Task) -> None:
     choices = choices_of(of)
@@ -156,7 +157,7 @@ def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Ta
     assert within.initial[8].lower <= best
 
 
-@examples(60)
+@examples(amount(30, 60))
 @given(of=tasks())
 def test_bounds_from_floats_hold_the_exact_values(of: Task) -> None:
     exact = solved(of)
@@ -181,7 +182,7 @@ def best_probability(space: StateSpace, limits: Limits) -> Bounds:
     return Bounds(low.lower, max_prob(space, limits, space.goal | space.fringe).initial.upper)
 
 
-@examples(100)
+@examples(amount(50, 100))
 @given(of=tasks())
 def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
     whole = explore_space(of, Limits())
@@ -193,7 +194,7 @@ def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
         assert bounds.lower <= known <= bounds.upper
 
 
-@examples(150)
+@examples(amount(80, 150))
 @given(of=tasks())
 def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
     found = solved(of)

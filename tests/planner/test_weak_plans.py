@@ -65,7 +65,7 @@ def test_by_novelty_a_plan_is_found_where_there_is_one(of: Task) -> None:
 def test_policies_are_found_whichever_search_finds_the_plans(of: Task) -> None:
     """By novelty from the first moment on."""
     _, safe = strong_cyclic_states(of)
-    with patch("bbtc.planner.strong_cyclic.weak_plan._LONG", 0):
+    with patch("bbtc.planner.strong_cyclic.weak_plan.PATIENCE", 0):
         done = plan_strong_cyclic(of, Fraction(1), Limits(), lambda _: None)
     assert (done.tree.status == "target-reached") == (set(initial_belief(of)) <= safe)
 

@@ -240,6 +240,13 @@ SECTIONS: dict[str, ast.Section] = {
         ),
         S,
     ),
+    "(:predicates (observed (p ?x)) (observed ?x))": ast.Predicates(
+        (
+            ast.PredicateDeclaration(name("p"), (group("?x"),), False, S, observed=True),
+            ast.PredicateDeclaration(name("observed"), (group("?x"),), False, S),
+        ),
+        S,
+    ),
     "(:predicates (external (p)) (external (unknown (q ?x))) (external ?x) (external))": ast.Predicates(
         (
             ast.PredicateDeclaration(name("p"), (), False, S, external=True),

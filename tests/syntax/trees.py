@@ -176,13 +176,13 @@ sections = st.one_of(
         ast.Predicates,
         tuples(
             st.builds(
-                lambda name, parameters, three_valued, external: ast.PredicateDeclaration(
-                    name, parameters, three_valued, S, external
+                lambda name, parameters, three_valued, mark: ast.PredicateDeclaration(
+                    name, parameters, three_valued, S, mark == "external", mark == "observed"
                 ),
                 names,
                 typed_lists(variables),
                 st.booleans(),
-                st.booleans(),
+                st.sampled_from(["", "external", "observed"]),
             )
         ),
     ),

@@ -122,7 +122,7 @@ def command(
     options = Options(max_actions, retries, prefer, closed_world, allow_guess)
     require_strategy(strategy, options if not bounds else DEFAULTS)
     session.expect_output(output, files, check=check and not bounds, depfile=None if bounds else depfile)
-    task = load_task(session, files, limits)
+    task = load_task(session, files, limits, keep_hidden=allow_guess)
     if bounds:
         wanted = task.goal_probability if target is None else target
         return _print_bounds(session, task, wanted, options, output, as_json=as_json)

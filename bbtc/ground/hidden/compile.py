@@ -9,13 +9,13 @@ from fractions import Fraction
 from bbtc.collector import collector_paused
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground import task as gt
-from bbtc.ground.condition import Condition, Is, compile_condition, variables
-from bbtc.ground.hidden.changes import Local, act, divided, join
+from bbtc.ground.condition import FALSE, TRUE, Condition, Is, compile_condition, variables
+from bbtc.ground.hidden.changes import Local, act, divided, join, read_after, telling
 from bbtc.ground.hidden.groups import Groups
 from bbtc.ground.hidden.knowledge import KnownConditions, TooManyCases
 from bbtc.ground.hidden.naming import formula_names
 from bbtc.ground.hidden.parts import Setting, all_settings, effects_of, settings_of
-from bbtc.ground.hidden.physical import Physical, physical
+from bbtc.ground.hidden.physical import Draw, Physical, physical
 from bbtc.ground.hidden.relevance import relevant
 from bbtc.ground.hidden.uncertain import hidden_facts
 from bbtc.ground.hidden.worlds import TooManyWorlds, Worlds, given_true
@@ -52,11 +52,13 @@ class _Compiler:
         self._report = report
         self._limits = limits
         hidden = hidden_facts(found)
+        self._doubt(hidden)
         kept, names = relevant(found, hidden)
         self._hidden = hidden & kept
         self._kept = kept
+        odds = dict(_odds(found.draws))
         self._acts = [
-            act(action, found.readings.get(action.name, ()), kept, self._hidden)
+            act(action, found.readings.get(action.name, ()), kept, self._hidden, odds)
             for action in found.task.actions
             if action.name in names
         ]
@@ -73,7 +75,29 @@ class _Compiler:
             self._groups.join(draw.variables)
         for condition, _ in self._clauses:
             self._groups.join(variables(condition))
-        join(self._groups, self._acts)
+        self._told_first = list(self._at_first())
+        self._draws_of: dict[int, list[Draw]] = {}
+        self._clauses_of: dict[int, list[tuple[Condition, Span | None]]] = {}
+        self._first_of: dict[int, list[gt.Observation]] = {}
+        join(self._groups, self._acts, self._told_first)
+
+    def _doubt(self, hidden: frozenset[int]) -> None:
+        """Warn of observations that tell nothing, whatever the arguments."""
+        for name, read in self._found.read.items():
+            if not read & hidden:
+                self._report.warning(
+                    "BBT0417",
+                    f"`:observe` of action `{name}` tells nothing: what it reads is always seen",
+                    self._model.schemas[name].observe_span,
+                    "say in `:init` what is not known, as `(unknown (p))` or `(oneof …)`",
+                )
+
+    def _at_first(self) -> Iterator[gt.Observation]:
+        """What sensors tell at the start; whether they do, as far as that is seen, is settled."""
+        for reading in telling(self._found.first, self._hidden):
+            when = given_true(reading.when or TRUE, self._found.start, self._hidden)
+            if when != FALSE:
+                yield replace(reading, when=None if when == TRUE else when)
 
     def task(self) -> gt.Task:
         """The task whose conditions read knowledge."""
@@ -93,6 +117,7 @@ class _Compiler:
             templates=templates,
         )
         asked = set(_asked(made))
+        self._assign()
         components = [self._component(each, read.knowledge, asked) for each in facts.values()]
         self._report.raise_errors()
         values = [*self._found.start, *[Truth.UNKNOWN] * len(read.knowledge.formulas)]
@@ -111,6 +136,21 @@ class _Compiler:
             if (number in asked if number in self._hidden or number >= last else number in self._kept)
         ]
         return reordered(made, sorted(order, key=lambda number: made.variables[number].name))
+
+    def _assign(self) -> None:
+        """Give draws, conditions and what is told at first to their components."""
+        for draw in self._draws:
+            if draw.variables:
+                self._draws_of.setdefault(self._groups.of(draw.variables[0]), []).append(draw)
+        for condition, span in self._clauses:
+            leader = next((self._groups.of(variable) for variable in variables(condition)), None)
+            if leader is not None:
+                self._clauses_of.setdefault(leader, []).append((condition, span))
+            elif condition == FALSE:
+                contradicted(self._report, span)
+        for reading in self._told_first:
+            leader = next(self._groups.of(each) for each in read_after([reading]) if each in self._groups)
+            self._first_of.setdefault(leader, []).append(reading)
 
     # --- conditions --------------------------------------------------------------------------
 
@@ -190,12 +230,8 @@ class _Compiler:
     def _component(self, facts: Sequence[int], knowledge: KnownConditions, asked: set[int]) -> gt.Component:
         self._limits.check_time("listing worlds")
         mine, start = set(facts), self._found.start
-        draws = [draw for draw in self._draws if mine.issuperset(draw.variables) and draw.variables]
-        clauses = [
-            (condition, span)
-            for condition, span in self._clauses
-            if mine.intersection(variables(condition)) or (not any(True for _ in variables(condition)))
-        ]
+        leader = self._groups.of(facts[0])
+        draws, clauses = self._draws_of.get(leader, []), self._clauses_of.get(leader, [])
         given = {fact: start[fact] is Truth.TRUE for fact in facts if fact not in self._found.uncertain}
         names = [self._found.task.variables[fact].name for fact in facts]
         try:
@@ -222,7 +258,17 @@ class _Compiler:
             for formula, number in knowledge.formulas.items()
             if mine.issuperset(variables(formula)) and number in asked
         ]
-        return gt.Component(tuple(names), tuple(prior.items()), tuple(known))
+        first = tuple(map(local.observation, self._first_of.get(leader, ())))
+        return gt.Component(tuple(names), tuple(prior.items()), tuple(known), first, tuple(local.seen))
+
+
+def _odds(draws: Iterable[Draw]) -> Iterator[tuple[int, Fraction]]:
+    """The facts that have a draw of their own, with their probabilities."""
+    for draw in draws:
+        if len(draw.variables) == 1:
+            (variable,) = draw.variables
+            whole = sum((weight for weight, _ in draw.branches), Fraction(0))
+            yield variable, sum((weight for weight, true in draw.branches if true), Fraction(0)) / whole
 
 
 def _known_at_first(component: gt.Component) -> Iterator[tuple[int, Truth]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Set
+from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import NamedTuple
@@ -111,35 +111,43 @@ def facts_of(factor: gt.Factor) -> set[int]:
     return found
 
 
-def drawn_anew(parts: Parts) -> Parts:
-    """The parts in which what becomes unknown is drawn: true or false, as likely."""
+def drawn_anew(parts: Parts, odds: Mapping[int, Fraction]) -> Parts:
+    """The parts in which what becomes unknown is drawn: true with the probability that ``odds`` gives, else
+    with 1/2."""
     forgets: dict[int, list[Condition]] = {}
     for setting in parts.settings:
         if setting.value is Truth.UNKNOWN:
             forgets.setdefault(setting.variable, []).append(TRUE if setting.when is None else setting.when)
     settings = [setting for setting in parts.settings if setting.value is not Truth.UNKNOWN]
-    draws = [replace(draw, outcomes=tuple(map(_anew, draw.outcomes))) for draw in parts.draws]
-    draws += [_coin(variable, disjunction(whens)) for variable, whens in forgets.items()]
+    draws = [
+        replace(draw, outcomes=tuple(_anew(outcome, odds) for outcome in draw.outcomes))
+        for draw in parts.draws
+    ]
+    draws += [_coin(variable, disjunction(whens), odds) for variable, whens in forgets.items()]
     return Parts(settings, parts.charges, parts.cost, parts.reward, draws)
 
 
-def _anew(outcome: gt.Outcome) -> gt.Outcome:
+def _anew(outcome: gt.Outcome, odds: Mapping[int, Fraction]) -> gt.Outcome:
     known, coins = [], []
     for setting in settings_of(outcome):
         if setting.value is Truth.UNKNOWN:
-            coins.append(_coin(setting.variable, TRUE if setting.when is None else setting.when))
+            coins.append(_coin(setting.variable, TRUE if setting.when is None else setting.when, odds))
         else:
             known.append(setting)
-    inner = [replace(factor, outcomes=tuple(map(_anew, factor.outcomes))) for factor in outcome.factors]
+    inner = [
+        replace(factor, outcomes=tuple(_anew(each, odds) for each in factor.outcomes))
+        for factor in outcome.factors
+    ]
     return replace(outcome, effects=effects_of(known), factors=(*inner, *coins))
 
 
-def _coin(variable: int, when: Condition) -> gt.Factor:
+def _coin(variable: int, when: Condition, odds: Mapping[int, Fraction]) -> gt.Factor:
+    true = odds.get(variable, Fraction(1, 2))
     guard = None if when == TRUE else when
     return gt.Factor(
         tuple(
-            gt.Outcome(Fraction(1, 2), (gt.Effect(guard, ((variable, value),)),))
-            for value in (Truth.TRUE, Truth.FALSE)
+            gt.Outcome(probability, (gt.Effect(guard, ((variable, value),)),))
+            for value, probability in ((Truth.TRUE, true), (Truth.FALSE, 1 - true))
         )
     )
 

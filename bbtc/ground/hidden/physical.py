@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
-from bbtc.ground.condition import Condition, Constant, Is, Known, replaced
-from bbtc.ground.lower import Frame, Lowered, Lowering
+from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, Known, replaced, variables
+from bbtc.ground.lower import Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normal_form
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.refused import noise
@@ -42,13 +42,19 @@ class Clause:
 @dataclass(frozen=True, slots=True)
 class Physical:
     """A task in which what is hidden at the start is unknown, and what actions tell of it (``readings``, by
-    the action's name). Its conditions are about the world, but for tests whether a fact is known."""
+    the action's name); ``first`` is what sensors tell at the start. Its conditions are about the world, but
+    for tests whether a fact is known."""
 
     task: gt.Task
     readings: Mapping[str, tuple[gt.Observation, ...]]
+    first: tuple[gt.Observation, ...]
     draws: tuple[Draw, ...]
     clauses: tuple[Clause, ...]
     uncertain: frozenset[int]
+    observed: frozenset[int]
+    """The facts that are declared as always seen: ``first`` and ``readings`` tell them."""
+    read: Mapping[str, frozenset[int]]
+    """By schema: what the ``:observe`` of its actions tells of."""
 
     @property
     def start(self) -> tuple[Truth, ...]:
@@ -79,8 +85,33 @@ def physical(model: md.Model, report: Report, limits: Limits) -> Physical:
         for clause in begin.prior.clauses
         for part in conjuncts(normal_form(clause.condition))
     ]
+    sensors = list(_sensed(builder.lowering, model.sensors, limits))
+    for name, predicate in model.predicates.items():
+        if predicate.observed:
+            sensors += [gt.Observation(Is(number, Truth.TRUE)) for number in atoms.numbers[name].values()]
     task = builder.task(reached.actions)
-    return _numbered(task, readings, begin.prior, clauses, atoms)
+    return _numbered(
+        task, readings=readings, sensors=sensors, prior=begin.prior, clauses=clauses, atoms=atoms
+    )
+
+
+def _sensed(lowering: Lowering, sensors: Iterable[md.Sensor], limits: Limits) -> Iterator[gt.Observation]:
+    """What each sensor tells, and when."""
+    universe = lowering.universe
+    for sensor in sensors:
+        limits.check_time("grounding")
+        frame = Frame(universe, sensor.parameters)
+        when = lowering.condition(sensor.condition, frame)
+        told = _told(lowering, sensor.sensed, frame)
+        loops = [(frame.slot(p.name), universe.members(p.types)) for p in sensor.parameters]
+        for env in extend(frame.env([-1] * len(loops)), loops, lowering.spend):
+            condition = when(env)
+            if condition == FALSE:
+                continue
+            for sensed, accuracy in told:
+                found = sensed(env)
+                if not isinstance(found, Constant):
+                    yield gt.Observation(found, accuracy, None if condition == TRUE else condition)
 
 
 def _told(
@@ -97,7 +128,9 @@ def _told(
 
 def _numbered(
     task: gt.Task,
+    *,
     readings: Mapping[str, list[gt.Observation]],
+    sensors: list[gt.Observation],
     prior: Prior,
     clauses: list[Clause],
     atoms: Atoms,
@@ -121,19 +154,47 @@ def _numbered(
         for draw in prior.draws
     ]
     uncertain = frozenset(map(variable, prior.atoms))
+    observed = {name for name, predicate in atoms.model.predicates.items() if predicate.observed}
     (first, *_) = task.initial
     values = tuple(
         Truth.UNKNOWN if number in uncertain else value for number, value in enumerate(first.values)
     )
-    made = {action.name for action in task.actions}
+
+    def observation(made: gt.Observation) -> gt.Observation:
+        when = None if made.when is None else replaced(made.when, leaf)
+        return replace(made, condition=replaced(made.condition, leaf), when=when)
+
+    read: dict[str, set[int]] = {}
+    for action in task.actions:
+        if action.name in readings:
+            of = read.setdefault(action.schema, set())
+            of.update(renumber[each] for told in readings[action.name] for each in variables(told.condition))
+    told_first = [observation(each) for each in sensors]
+    of_sensors = _after_actions(task, told_first)
     return Physical(
         replace(task, initial=(gt.InitialState(Fraction(1), values),)),
         {
-            name: tuple(replace(each, condition=replaced(each.condition, leaf)) for each in told)
-            for name, told in readings.items()
-            if name in made
+            action.name: (*map(observation, readings.get(action.name, ())), *of_sensors[action.name])
+            for action in task.actions
         },
+        tuple(told_first),
         tuple(draws),
         tuple(Clause(replaced(each.condition, leaf), each.span) for each in clauses),
         uncertain,
+        frozenset(number for number, each in enumerate(task.variables) if each.predicate in observed),
+        {schema: frozenset(numbers) for schema, numbers in read.items()},
     )
+
+
+def _after_actions(task: gt.Task, sensors: Sequence[gt.Observation]) -> dict[str, list[gt.Observation]]:
+    """What sensors tell after each action, by its name: those that read what it may change."""
+    readers: dict[int, list[int]] = {}
+    for number, sensor in enumerate(sensors):
+        for variable in {*variables(sensor.condition), *variables(sensor.when or TRUE)}:
+            readers.setdefault(variable, []).append(number)
+    found = {}
+    for action in task.actions:
+        sets = {variable for effect in gt.effects_of(action.factors) for variable, _ in effect.sets}
+        numbers = {number for variable in sets for number in readers.get(variable, ())}
+        found[action.name] = [sensors[number] for number in sorted(numbers)]
+    return found

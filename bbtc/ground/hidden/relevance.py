@@ -44,13 +44,11 @@ def relevant(physical: Physical, hidden: frozenset[int]) -> tuple[set[int], set[
             if together & hidden:
                 _couple(leads, together)
         for reading in physical.readings.get(action.name, ()):
-            read = set(variables(reading.condition)) | set(
-                () if reading.when is None else variables(reading.when)
-            )
-            for variable in read & hidden:
-                leads.setdefault(("variable", variable), set()).update(
-                    {node, *(("variable", other) for other in read)}
-                )
+            for variable, others in _coupled(reading, hidden):
+                leads.setdefault(("variable", variable), set()).update({node, *others})
+    for reading in physical.first:
+        for variable, others in _coupled(reading, hidden):
+            leads.setdefault(("variable", variable), set()).update(others)
     for together in _of_start(physical):
         _couple(leads, together)
     _tell(physical, hidden, leads)
@@ -60,6 +58,12 @@ def relevant(physical: Physical, hidden: frozenset[int]) -> tuple[set[int], set[
     kept = {number for kind, number in found if kind == "variable"}
     names = {physical.task.actions[number].name for kind, number in found if kind == "action"}
     return kept, names
+
+
+def _coupled(reading: gt.Observation, hidden: frozenset[int]) -> Iterator[tuple[int, list[_Node]]]:
+    """The hidden variables that a reading tells of, each with all that it reads."""
+    read = {*variables(reading.condition), *(() if reading.when is None else variables(reading.when))}
+    return ((variable, [("variable", other) for other in read]) for variable in read & hidden)
 
 
 def _nodes(condition: Condition) -> Iterator[_Node]:
@@ -97,7 +101,7 @@ def _tell(physical: Physical, hidden: frozenset[int], leads: dict[_Node, set[_No
                     comes.setdefault(variable, set()).update(together & hidden)
     told = {
         variable
-        for readings in physical.readings.values()
+        for readings in (*physical.readings.values(), physical.first)
         for reading in readings
         for variable in variables(reading.condition)
         if variable in hidden

@@ -3,7 +3,7 @@
 1. A fact that is drawn at the start, stands in a condition there, or is unknown, is hidden.
 2. What an effect sets is hidden where it reads a hidden fact, or makes it unknown.
 3. A fact that an observation tells, and that chance may change, is hidden, and so is what it comes from:
-   there would be nothing to tell of it else.
+   there would be nothing to tell of it else. What is declared as always seen needs no such thing.
 
 All others are seen: the robot knows them at all times.
 """
@@ -35,9 +35,10 @@ def hidden_facts(physical: Physical) -> frozenset[int]:
     hidden = _closed(hidden, leads)
     told = {
         variable
-        for readings in physical.readings.values()
+        for readings in (*physical.readings.values(), physical.first)
         for reading in readings
         for variable in variables(reading.condition)
+        if variable not in physical.observed
     }
     by_chance = _closed(drawn, leads)
     sources = reachable(

@@ -12,8 +12,10 @@ from bbtc.ground.condition import (
     Condition,
     Is,
     Known,
+    Or,
     compile_condition,
     evaluate,
+    negation,
     replaced,
     variables,
 )
@@ -47,7 +49,7 @@ class Worlds:
         self._given = given
         self._limits = limits
         self._draws = [self._local(draw) for draw in draws]
-        places = [replaced(clause, self._leaf) for clause in clauses]
+        places = [replaced(clause, self._leaf) for clause in clauses if not _always(clause)]
         self._clauses = [(compile_condition(each), sorted(set(variables(each)))) for each in places]
         self._of_fact: list[tuple[list[int], list[int]]] = [([], []) for _ in facts]
         for number, (atoms, _) in enumerate(self._draws):
@@ -73,6 +75,9 @@ class Worlds:
     def all(self) -> dict[int, Fraction]:
         """Every world, as a bit mask, with its probability; none where all contradict. Raises
         :class:`TooManyWorlds`."""
+        alone = [place for place, (draws, clauses) in enumerate(self._of_fact) if not draws and not clauses]
+        if 2 ** (len(alone) - len(self._given)) > MOST_WORLDS:
+            raise TooManyWorlds
         values = bytearray([Truth.UNKNOWN]) * len(self._place)
         active = [branches for _, branches in self._draws]
         certain = [(self._place[fact], value) for fact, value in self._given.items()]
@@ -176,6 +181,11 @@ class Worlds:
                 possible.append((place, truth is Truth.TRUE))
         values[place] = Truth.UNKNOWN
         return possible if len(possible) == 1 else None if not possible else []
+
+
+def _always(clause: Condition) -> bool:
+    """Does a clause hold whatever is the case, as `(or (p) (not (p)))` does?"""
+    return isinstance(clause, Or) and any(negation(part) in clause.parts for part in clause.parts)
 
 
 def given_true(condition: Condition, start: Sequence[Truth], hidden: frozenset[int]) -> Condition:

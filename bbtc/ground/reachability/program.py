@@ -73,6 +73,11 @@ class ProgramBuilder:
         program = self.program
         for rule in self.model.rules:
             self._derive(rule)
+        for name in sorted(self.usage.doubted):
+            # What a hidden fact makes true may be unknown before it is told.
+            parameters = self.model.predicates[name].parameters
+            number = self.number[name]
+            self._rule(_atom(f"u{number}", parameters), [_atom(f"t{number}", parameters)])
         for index, schema in enumerate(self.model.schemas.values()):
             self._action(index, schema)
         for index, template in enumerate(self.model.templates.values()):
@@ -169,7 +174,9 @@ class ProgramBuilder:
             if len(body) > 1 or len(terms) < len(scope):
                 body = self._named(body, terms)
         for leaf in group.sets:
-            self._rule(self._call(f"{LETTER[leaf.value]}{self.number[leaf.predicate]}", leaf.args), body)
+            letters = "utf" if self.usage.hides and leaf.value is Truth.UNKNOWN else LETTER[leaf.value]
+            for letter in letters:
+                self._rule(self._call(f"{letter}{self.number[leaf.predicate]}", leaf.args), body)
 
     # --- rule bodies -------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.hidden import has_hidden_state
 from bbtc.model.types import Parameter
 
 
@@ -42,6 +43,9 @@ class Usage:
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
         self.open = open_predicates(model)
+        self.hides = has_hidden_state(model)
+        """Is there hidden state? Then what becomes unknown is true, or false."""
+        self.doubted = self._doubted() if self.hides else set[str]()
         self._readers: dict[str, set[str]] = {}
         """By predicate: the derived ones that a rule computes from it."""
         for rule in model.rules:
@@ -62,8 +66,31 @@ class Usage:
     def can_be_unknown(self, predicate: str) -> bool:
         """Whether some atom of the predicate may be unknown at some time."""
         if predicate in self.derived:
-            return predicate not in self.unchanging and self.model.predicates[predicate].three_valued
+            possible = self.hides or self.model.predicates[predicate].three_valued
+            return predicate not in self.unchanging and possible
+        if predicate in self.doubted:
+            return True
         return Truth.UNKNOWN in self.set_values.get(predicate, ()) or bool(self.start.unknown.get(predicate))
+
+    def _doubted(self) -> set[str]:
+        """Predicates of which something asks whether they are known, and which effects that read hidden facts
+        may leave unknown: any that an effect sets, for all that is known here."""
+        formulas = [schema.precondition for schema in self.model.schemas.values()]
+        formulas += [
+            guard for schema in self.model.schemas.values() for guard in me.conditions(schema.effect)
+        ]
+        formulas += [
+            condition for each in self.model.templates.values() for condition in md.conditions(each.body)
+        ]
+        formulas += [rule.condition for rule in self.model.rules]
+        formulas += [] if self.model.goal is None else [self.model.goal]
+        asked = {
+            reading.atom.predicate
+            for formula in formulas
+            for reading in mf.readings(formula)
+            if reading.value in {Truth.UNKNOWN, None}
+        }
+        return asked & self.set_values.keys()
 
     def _only_reading(self, base: set[str]) -> set[str]:
         """Derived predicates that only read, all the way down, predicates of ``base``. Where these are

@@ -25,7 +25,8 @@ _HELPFUL, _NOVEL, _ALL = 1, 2, 0
 _QUEUES = (_HELPFUL, _NOVEL, _ALL)  # in this order where their priorities are equal
 _BOOST = 1000  # expansions that helpful actions are preferred for after progress
 _STALLED = 250  # expansions without progress, after which the third queue is used, too
-_LONG = 100  # and after which the search by novelty is tried beside this one
+PATIENCE = 100
+"""Expansions without progress, after which the search by novelty is tried beside this one."""
 _AT_THE_COST = 50  # operators of the relaxation: to expand a state takes as long as they do in an estimate
 _SHORT_WAY = 2  # steps of a relaxed plan that are worth following; single ones are tried anyway
 _LOOK = 64  # evaluations between two looks at the limits
@@ -84,7 +85,7 @@ class Searcher:
         ahead: int | None = None
         beside = ByNovelty(self, start, arrived)
         while frontier:
-            plan = beside.go_on(self._worth) if frontier.idle >= _LONG else None
+            plan = beside.go_on(self._worth) if frontier.idle >= PATIENCE else None
             if plan is not None:
                 return plan
             state = frontier.pop() if ahead is None else ahead
