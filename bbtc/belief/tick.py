@@ -24,8 +24,6 @@ from bbtc.tree.nodes import (
     ControlNode,
     Node,
     actions_of,
-    retries_of,
-    retries_until_success_of,
     walk,
 )
 
@@ -118,14 +116,22 @@ class Memory:
 
 def memory_of(root: Node) -> Memory:
     """The memory of a tree."""
-    actions = sum(1 for _ in actions_of(root))
+    actions = 0
+    retries: list[ControlNode] = []
+    until_success: list[ControlNode] = []
+    for node in walk(root):  # once: planners ask about many trees
+        if isinstance(node, ActionNode):
+            actions += 1
+        elif isinstance(node, ControlNode) and node.attempts is not None:
+            (retries if node.kind == "retry" else until_success).append(node)
     shift = actions
     own: dict[str, Counter] = {}
-    for retry, attempts in (*retries_of(root), *retries_until_success_of(root)):
+    for node in (*retries, *until_success):
+        attempts = node.attempts or 0
         bits = attempts.bit_length()
-        own[retry.id] = Counter(retry.id, shift, (1 << bits) - 1, attempts)
+        own[node.id] = Counter(node.id, shift, (1 << bits) - 1, attempts)
         shift += bits
-    until = _attempts(root, own, actions)
+    until = _attempts(root, own, until_success, actions)
     counters: list[tuple[Counter, ...]] = []
     started: list[int] = []
     above: list[tuple[Attempts, ...]] = []
@@ -157,14 +163,16 @@ def memory_of(root: Node) -> Memory:
     return Memory(tuple(counters), tuple(started), tuple(above), tuple(kept))
 
 
-def _attempts(root: Node, own: Mapping[str, Counter], actions: int) -> dict[str, Attempts]:
+def _attempts(
+    root: Node, own: Mapping[str, Counter], until_success: Sequence[ControlNode], actions: int
+) -> dict[str, Attempts]:
     """By id, what belongs to each retry-until-success node, outer ones first."""
-    if not any(retries_until_success_of(root)):
+    if not until_success:
         return {}
     order = {node.id: number for number, node in enumerate(actions_of(root))}
     found: dict[str, Attempts] = {}
     levels: dict[str, int] = {}
-    for node, _ in retries_until_success_of(root):
+    for node in until_success:
         below = 0
         for each in walk(node.children[0]):
             if each.id in order:

@@ -99,7 +99,7 @@ _POLICY_SHARE = 0.7  # of the time, where facts are hidden
 _STATES_ELSEWHERE = 5_000
 """States of the simulation of a tree from where others may leave the world."""
 
-_SEARCH_SHARE, _SURE_SHARE = 0.4, 0.5  # of the time left
+_SEARCH_SHARE, _SURE_SHARE, _NEARLY_ALL = 0.4, 0.5, 0.9  # of the time left
 
 
 def plan_auto(
@@ -223,7 +223,10 @@ class _Auto:
         task, target, options = self.task, self.target, self.options
         self.add(plan_policy(task, target, self.limits.part(_POLICY_SHARE), _silent, options))
         if not self.interrupted:
-            self.add(plan_search(task, target, self.limits.part(_SEARCH_SHARE), _silent, options))
+            limits = self.limits
+            if self.met and task.endless_beliefs:  # trees that ask without end would use up all states
+                limits = replace(limits, states=min(limits.states, _FEW_STATES))
+            self.add(self.searched(limits))
         if not self.interrupted and not self.met:
             self.add(self.refinement(refined))
 
@@ -347,7 +350,8 @@ class _Auto:
         """A policy over partial states, unless there is none that surely reaches the goal."""
         if self.upper < 1:
             return None
-        limits = self.limits.part(_SURE_SHARE)
+        # Where it finds none, it looks for the best policy there is: both share nearly all the time.
+        limits = self.limits.part(_SURE_SHARE if self.met else _NEARLY_ALL)
         if self.met:
             if self.best.worth.nodes == 1 or len(self.task.actions) > MANY_ACTIONS:
                 return None

@@ -11,6 +11,8 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 
+import numpy as np
+
 from bbtc.ground.task import Factor, GroundAction, Outcome, Task
 from bbtc.tree.nodes import Node
 from tests.replay.reference import Ticking, value_of
@@ -96,6 +98,14 @@ def best_chances(task: Task, states: set[State], sweeps: int = 3000) -> dict[Sta
     return values
 
 
+def best_next(task: Task, state: State, values: dict[State, float]) -> float:
+    """The best that one action makes of the values of the states that it leads to; 0 without any."""
+    ready = (action for action in task.actions if value_of(action.precondition, state) == "T")
+    ways = (outcomes_in(action, state).items() for action in ready)
+    totals = (sum(float(chance) * values[after] for (after, _), chance in way) for way in ways)
+    return max(totals, default=0.0)
+
+
 class Exact:
     """The chances of a tree in a world that changes with a rate before each tick, within a number of
     ticks."""
@@ -135,27 +145,27 @@ class Exact:
                     belief[successor] = belief.get(successor, 0.0) + p * q
         return found | {"cut": sum(belief.values())}
 
-    def success_from(self, states: Iterable[State], ticks: int) -> dict[State, float]:
-        """The chance of success within a number of ticks from each of these states, if nothing changes by
-        itself: what :meth:`chances` says with a rate of 0, by one iteration for all."""
-        starts: dict[State, Key] = {state: (state, (), (), ()) for state in states}
-        after: dict[Key, list[tuple[float, Key]]] = {}
-        wins: dict[Key, float] = {}
-        waiting = list(starts.values())
-        while waiting:
-            key = waiting.pop()
-            if key not in wins:
-                kind, results = self._ticked(key)
-                wins[key] = float(kind == "success")
-                after[key] = [(chance, successor) for chance, _, successor in results]
-                waiting += [successor for _, successor in after[key]]
-        acting = [(key, ways) for key, ways in after.items() if ways]
-        for _ in range(ticks - 1):
-            now = {key: sum(p * wins[successor] for p, successor in ways) for key, ways in acting}
-            if all(now[key] - wins[key] < 1e-13 for key in now):
-                break
-            wins.update(now)
-        return {state: wins[key] for state, key in starts.items()}
+    def ever(self, states: Iterable[State]) -> dict[State, float]:
+        """How probably runs from states ever end in success, in a world that nobody else changes, however
+        long they take; of a tree without memory, and states that nothing leads out of."""
+        numbers = {state: number for number, state in enumerate(states)}
+        onward = np.zeros((len(numbers), len(numbers)))
+        done = np.zeros(len(numbers))
+        for state, number in numbers.items():
+            kind, after = self._ticked((state, (), (), ()))
+            done[number] = kind == "success"
+            for p, _, (successor, *memory) in after:
+                assert not any(memory)
+                onward[number, numbers[successor]] += p
+        hopeful = done > 0
+        while (more := hopeful | (onward @ hopeful > 0)).sum() > hopeful.sum():
+            hopeful = more
+        # What never succeeds is left out, so that the system has one solution.
+        going = np.flatnonzero(hopeful & (done == 0))
+        values = done.copy()
+        inner = np.eye(len(going)) - onward[np.ix_(going, going)]
+        values[going] = np.linalg.solve(inner, onward[going] @ done)
+        return {state: float(values[number]) for state, number in numbers.items()}
 
     def _ticked(self, key: Key) -> tuple[str, After]:
         if key in self._seen:

@@ -8,7 +8,7 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
@@ -22,13 +22,15 @@ from bbtc.pipeline import plan_task
 from bbtc.planner.mdp import solve
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.maxprob import max_prob
+from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.planner.synthesis import policy
 from bbtc.planner.synthesis.decision_tree import decision_tree
 from bbtc.planner.synthesis.permissive import likely_policy, likely_way, one_policy
+from bbtc.rewrite.retry import longest_run
 from tests.long_form import amount
 from tests.planner.examples import public
-from tests.planner.journeys import journeys
+from tests.planner.journeys import journey, journeys
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -95,6 +97,65 @@ def test_without_a_limit_it_is_the_best_there_is(strategy: str, of: Task) -> Non
     assert known is not None
     assert float(plan.tree.success_probability) == pytest.approx(float(known), abs=CLOSE)
     assert plan.tree.status == ("target-reached" if plan.tree.success_probability == 1 else "out-of-reach")
+
+
+# --- within a number of actions ----------------------------------------------------------------
+
+
+def within(of: Task, budget: int, limits: Limits) -> None:
+    plan = plan_task(of, Fraction(1), "policy", limits, lambda _: None, options=Options(max_actions=budget))
+    is_written(of, plan)
+    longest = longest_run(explore(of, plan.tree.root, Limits()))
+    assert longest is not None
+    assert longest <= budget
+
+
+@MANY
+@given(of=SOME, states=st.integers(1, 12), budget=st.integers(1, 9))
+def test_whatever_limit_on_states_ends_planning_within_a_number_of_actions(
+    of: Task, states: int, budget: int
+) -> None:
+    within(of, budget, Limits(states=max(states, len(of.initial))))
+
+
+@MANY
+@given(of=SOME, looks=st.integers(1, 60), budget=st.integers(1, 9))
+def test_whenever_the_time_for_a_number_of_actions_is_over(of: Task, looks: int, budget: int) -> None:
+    clock = itertools.count()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bbtc.limits.time", SimpleNamespace(monotonic=lambda: next(clock) / 100))
+        within(of, budget, Limits(seconds=looks / 100, memory=None).since(0))
+
+
+@MANY
+@given(of=SOME, budget=st.integers(1, 9))
+@example(of=journey(66272), budget=4)  # a sign that is still not read when the first phase ends
+def test_what_is_written_in_haste_attains_the_best_within_a_number_of_actions(of: Task, budget: int) -> None:
+    def over(*_: object) -> None:
+        raise Limits.reached("it is over", "--time-limit")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(policy, "synthesize", over)
+        patch.setattr(policy, "in_phases", over)
+        within(of, budget, Limits())
+
+
+@MANY
+@given(of=SOME, budget=st.integers(1, 9))
+def test_a_way_is_written_when_there_is_no_time_for_phases(of: Task, budget: int) -> None:
+    def over(*_: object) -> None:
+        raise Limits.reached("it is over", "--time-limit")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(policy, "phases", over)
+        plan = plan_task(
+            of, Fraction(1), "policy", Limits(), lambda _: None, options=Options(max_actions=budget)
+        )
+    assert plan.tree.bounds is not None
+    assert plan.tree.success_probability > 0 or plan.tree.bounds[0] == 0
+    longest = longest_run(explore(of, plan.tree.root, Limits()))
+    assert longest is not None
+    assert longest <= budget
 
 
 def test_a_long_way_is_written_when_there_is_no_time_for_more() -> None:

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
@@ -36,6 +36,7 @@ from bbtc.tree.nodes import ActionNode, ControlNode, Node, retries_of, walk
 from bbtc.tree.validate import check_tree
 from tests.long_form import amount
 from tests.planner.examples import Optimum, cases, corpus_optima
+from tests.planner.journeys import journey, journeys
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -114,7 +115,8 @@ def test_cases_are_solved_at_their_best_within_every_budget(case: Optimum) -> No
 
 
 @examples(amount(100, 200))
-@given(of=tasks(), budget=st.integers(0, 6))
+@given(of=st.one_of(journeys(), tasks()), budget=st.integers(0, 6))
+@example(of=journey(92), budget=3)  # what nothing helps any more comes to the last phase, too
 def test_random_tasks_are_solved_at_their_best_within_a_budget(of: Task, budget: int) -> None:
     done = plan(of, "1", options=Options(max_actions=budget))
     chain = explore(of, done.tree.root, Limits())

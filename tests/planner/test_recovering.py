@@ -7,7 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bbtc.belief.chain import explore
@@ -24,10 +24,10 @@ from bbtc.planner.guard import guarded
 from bbtc.planner.recovering import recovering_tree
 from bbtc.tree.nodes import ActionNode, ControlNode, Node
 from bbtc.verifier.verdict import verify
-from tests.disturbance.reference import Exact, best_chances, reachable
+from tests.disturbance.reference import Exact, best_next, reachable
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.long_form import amount
-from tests.planner.journeys import journeys
+from tests.planner.journeys import journey, journeys
 from tests.planner.test_auto import plan
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
@@ -45,15 +45,16 @@ def tree_of(task: Task) -> Node:
 
 @examples(amount(80, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
+@example(of=journey(20308515))  # runs of even the best policies take thousands of steps
 def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) -> None:
     found = recovering_tree(of, Limits())
     states = reachable(of)
     if found is None or states is None:
         return
-    best = best_chances(of, states)
-    attained = Exact(of, found.root, 0.0, lambda state: []).success_from(states, 3000)
+    # However long runs take: no policy does better than values that no action improves on.
+    attained = Exact(of, found.root, 0.0, lambda state: []).ever(states)
     for state in states:
-        assert attained[state] == pytest.approx(best[state], abs=1e-6)
+        assert attained[state] >= best_next(of, state, attained) - 1e-9
 
 
 @examples(amount(80, 3000))
@@ -73,6 +74,8 @@ def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_trees_of_our_domains_recover(problem: Problem) -> None:
     of = task_of(problem)
+    if of.components:
+        pytest.skip("facts are hidden: nothing tells what the robot believes in other states (BBT0506)")
     if problem.domain in LARGE and problem.name != "after-the-alarm":
         pytest.skip("too many states for each")
     done = plan(of, "auto")

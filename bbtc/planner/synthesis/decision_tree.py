@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bbtc.ground.condition import FALSE
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -33,19 +34,23 @@ _OPPOSITE = {
 }
 
 
-def decision_tree(task: Task, policy: MultiPolicy, limits: Limits) -> Node:
+def decision_tree(task: Task, policy: MultiPolicy, limits: Limits, *, fall_through: bool = False) -> Node:
     """A tree that takes the first of the policy's choices in every state a run visits, and otherwise fails.
-    Raises ``LimitReached`` when the time is over."""
+    With ``fall_through`` it does so too once its actions may not start any more, and where the goal is
+    unknown and nothing is done about it, so that what follows gets its turn. Raises ``LimitReached`` when the
+    time is over."""
     label = np.full(len(policy.goal), _END, dtype=np.int64)
     label[policy.choice_state[::-1]] = policy.choice_action[::-1]
     goal = truths(task.goal, policy.values)
     unknown: Flags = goal == Truth.UNKNOWN
-    build = _Builder(task, policy.values, label, limits)
+    build = _Builder(task, policy.values, label, limits, fails=fall_through)
     node = goal_node(task, policy.values)
     if (unknown & (label != _END)).any():
         watching = build.tree(np.flatnonzero(unknown))
         assert watching is not None
         node = ControlNode("", "skipper", (node, watching))
+    elif fall_through and unknown.any():
+        node = ControlNode("", "skipper", (node, ConditionNode("", FALSE)))
     acting = build.tree(np.flatnonzero((goal == Truth.FALSE) | (unknown & (label == _END))))
     return numbered(node if acting is None else control("fallback", [node, acting]))
 
@@ -58,8 +63,12 @@ class _Branch:
 
 
 class _Builder:
-    def __init__(self, task: Task, values: npt.NDArray[np.uint8], label: Index, limits: Limits) -> None:
+    def __init__(
+        self, task: Task, values: npt.NDArray[np.uint8], label: Index, limits: Limits, *, fails: bool
+    ) -> None:
         self.task, self.values, self.label, self.limits = task, values, label, limits
+        self.fails = fails
+        """May any action fail to start?"""
         found = [Literal(at, test) for at in range(values.shape[1]) for test in (Test.TRUE, Test.UNKNOWN)]
         found = [each for each in found if each.holds(values).any() and not each.holds(values).all()]
         self.literals = found
@@ -87,7 +96,7 @@ class _Builder:
                 leaf = (
                     None if action == _END else ActionNode("", self.task.actions[action].name, latched=False)
                 )
-                done.append((leaf, leaf is None))
+                done.append((leaf, self.fails or leaf is None))
                 continue
             inside = self.holds[item, column]
             work.extend([_Branch(self.literals[column]), item[inside], item[~inside]])

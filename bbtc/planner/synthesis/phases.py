@@ -9,13 +9,14 @@ node of its own.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from bbtc.limits import Limits
 from bbtc.planner.mdp.finite_horizon import Horizon, best_choices, cheapest_choices
-from bbtc.planner.mdp.graph import Graph
+from bbtc.planner.mdp.graph import Graph, draw_probabilities
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.transitions import Index
 from bbtc.planner.synthesis.permissive import MultiPolicy, multi_policy
@@ -23,7 +24,8 @@ from bbtc.planner.synthesis.permissive import MultiPolicy, multi_policy
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """Up to ``steps`` actions by this multi-policy."""
+    """Up to ``steps`` actions by this multi-policy. It has the states of later phases, too, which are read
+    when its attempts are used up (idle), and those that earlier ones ended in."""
 
     steps: int
     policy: MultiPolicy
@@ -39,17 +41,73 @@ def phases(horizon: Horizon, limits: Limits) -> list[Phase]:
     return any_of_best if len(any_of_best) < len(cheap) else cheap
 
 
+def likely_way_within(horizon: Horizon) -> Phase | None:
+    """The choices of a policy that attains the horizon's value on the most probable way to the goal,
+    elsewhere a run ends; None where there is no such way. No state is twice on it, so it is short enough."""
+    space, graph = horizon.space, Graph(horizon.space)
+    steps = len(horizon.values) - 1
+    chance = np.log(draw_probabilities(space))
+    likely = [np.where(space.goal, 0.0, -np.inf)]
+    via: list[Index] = []
+    for step in range(1, steps + 1):
+        offered = best_choices(horizon, graph, step) & ~space.goal[space.choice_state]
+        edges = np.flatnonzero(offered[space.edge_choice])
+        states = space.choice_state[space.edge_choice[edges]]
+        found = chance[edges] + likely[-1][space.edge_successor[edges]]
+        best = likely[0].copy()
+        np.maximum.at(best, states, found)
+        edge = np.full(len(best), -1, dtype=np.int64)
+        on_best = np.isfinite(found) & (found == best[states])
+        edge[states[on_best]] = edges[on_best]
+        likely.append(best)
+        via.append(edge)
+    starts = [(math.log(p) + likely[steps][state], state) for p, state in space.initial if p]
+    weight, at = max(starts, key=lambda start: start[0])
+    if weight == -math.inf:
+        return None
+    taken = np.zeros(graph.choices, dtype=np.bool_)
+    last: dict[int, int] = {}
+    left = steps
+    while not space.goal[at]:
+        left -= 1
+        edge_taken = int(via[left][at])
+        last[at] = int(space.edge_choice[edge_taken])
+        at = int(space.edge_successor[edge_taken])
+    # Of a state met twice, what was done the last time: that way is shorter.
+    taken[list(last.values())] = True
+    return Phase(steps, multi_policy(space, taken))
+
+
 def _phases(horizon: Horizon, graph: Graph, best: list[Flags], limits: Limits) -> list[Phase]:
     space = horizon.space
     left = len(horizon.values) - 1
     entry = space.start
-    found: list[Phase] = []
+    ended = np.zeros(graph.states, dtype=np.bool_)
+    parts: list[_Part] = []
     while left and len(entry):
         steps, offered, inside, leaving = _longest(horizon, graph, best[:left], entry, limits)
-        found.append(Phase(steps, multi_policy(space, offered, entry, inside)))
+        inside |= ended
+        ended = ended | (inside & ~space.goal & ~space.having(offered))
+        parts.append(_Part(steps, offered, inside, np.union1d(entry, np.flatnonzero(ended))))
         left -= steps
         entry = leaving
-    return found
+    later = np.empty(0, dtype=np.int64)
+    found: list[Phase] = []
+    for part in reversed(parts):
+        read = np.union1d(part.entry, later)
+        found.append(Phase(part.steps, multi_policy(space, part.offered, read, part.inside)))
+        later = space.closure(read, part.offered & part.inside[space.choice_state])
+    return found[::-1]
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A phase: the choices offered, where it may start an action, and where it may be entered."""
+
+    steps: int
+    offered: Flags
+    inside: Flags
+    entry: Index
 
 
 def _longest(

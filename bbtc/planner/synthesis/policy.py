@@ -19,6 +19,7 @@ from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.finish import GRACE, finish
 from bbtc.planner.mdp.bounded_search import Advice
+from bbtc.planner.mdp.finite_horizon import Horizon
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb
 from bbtc.planner.mdp.solve import best_known, best_within
 from bbtc.planner.options import DEFAULTS, Options
@@ -32,8 +33,8 @@ from bbtc.planner.synthesis.permissive import (
     likely_way,
     one_policy,
 )
-from bbtc.planner.synthesis.phases import phases
-from bbtc.planner.synthesis.tree import in_phases, synthesize
+from bbtc.planner.synthesis.phases import Phase, likely_way_within, phases
+from bbtc.planner.synthesis.tree import in_phases, one_after_another, synthesize
 from bbtc.rewrite.retry import longest_run
 from bbtc.rewrite.shrink import shrunk
 from bbtc.rewrite.simplify import numbered, simplified, size
@@ -61,6 +62,7 @@ class _Search:
     whole: bool = False
     advice: Advice | None = None
     found: MaxProb | None = None
+    horizon: Horizon | None = None
     bounds: Bounds = field(default_factory=lambda: Bounds(Fraction(0), Fraction(1)))
     stop: Diagnostic | None = None
     interrupted: bool = False
@@ -110,7 +112,9 @@ class _Search:
     def _fall_back(self) -> None:
         """Write down the policy that is known, if that was not done before a limit, or the user, ended it."""
         found = self.found
-        if found is None or self._is_reached(found) or self.wider is not None:
+        if self.horizon is not None:
+            self._fall_back_within(self.horizon)
+        if found is None or self._is_reached(found.initial.lower) or self.wider is not None:
             return
         # The tree visits no state that was not found, but those may be a few more than the limit, and so may
         # what is worked out of an action.
@@ -122,18 +126,47 @@ class _Search:
                 self._draft(way, replace(few, seconds=None, until=None))
             limits = few.overtime(GRACE)
             for policy in (one_policy(found), *(likely_policy(found, most) for most in _DRAFTS)):
-                if policy is not None and not self._is_reached(found):
+                if policy is not None and not self._is_reached(found.initial.lower):
                     self._draft(policy, limits)
         except KeyboardInterrupt:
             self.interrupted = True
 
-    def _is_reached(self, found: MaxProb) -> bool:
+    def _is_reached(self, attained: Fraction) -> bool:
         """Is the tree as good as the policy that is known, or as the target asks for?"""
-        return self.best.success >= min(self.target, found.initial.lower - _CLOSE)
+        return self.best.success >= min(self.target, attained - _CLOSE)
+
+    def _fall_back_within(self, horizon: Horizon) -> None:
+        """The same within a number of actions."""
+        attained = horizon.initial[-1].lower
+        if self._is_reached(attained):
+            return
+        # A retry node counts, so that what is told apart of a state is how many actions are left.
+        most = len(horizon.space.states) * len(horizon.values)
+        few = replace(self.limits, states=max(self.limits.states, most, _ENOUGH))
+        try:
+            way = likely_way_within(horizon)
+            if way is not None:
+                self._draft_within([way], replace(few, seconds=None, until=None))
+            if not self._is_reached(attained):
+                limits = few.overtime(GRACE)
+                with suppress(LimitReached):
+                    self._draft_within(phases(horizon, limits), limits)
+        except KeyboardInterrupt:
+            self.interrupted = True
+
+    def _draft_within(self, parts: list[Phase], limits: Limits) -> None:
+        """A tree of phases, however large it is, to fall back on."""
+        with suppress(LimitReached):
+            trees = [
+                decision_tree(self.task, part.policy, limits, fall_through=number < len(parts))
+                for number, part in enumerate(parts, 1)
+            ]
+            self._keep(one_after_another(self.task, [part.steps for part in parts], trees), limits)
 
     def _within(self, steps: int) -> None:
         best = best_within(self.task, self.limits.part(_BEFORE_TREE), steps)
-        self.bounds, self.stop, horizon = best.bounds, best.stop, best.horizon
+        self.bounds, self.stop, self.horizon = best.bounds, best.stop, best.horizon
+        horizon = best.horizon
         parts = phases(horizon, self.limits)
         done = False
         if len(parts) == 1:

@@ -94,10 +94,11 @@ class Learner:
         found[self.policy.closure(self.policy.initial, self.taken)] = True
         return found
 
-    def learn(self, group: Flags, avoid: Flags) -> list[Rule]:
+    def learn(self, group: Flags, avoid: Flags, *, fall_through: bool = False) -> list[Rule]:
         """Rules that decide every state of ``group`` that has choices, and apply in none of
         ``avoid`` (nor in a state of the group without choices). Choices that the rules do not take
-        are dropped from :attr:`taken`."""
+        are dropped from :attr:`taken`. With ``fall_through`` each rule is asked anywhere, since the actions
+        of those before it may be refused."""
         rules: list[Rule] = []
         decided = np.zeros(len(self.policy.goal), dtype=np.bool_)
         active = self.policy.having()
@@ -109,7 +110,8 @@ class Learner:
                 return rules
             against = np.flatnonzero(relevant & ~decided & ((group & ~active & ~self.policy.idle) | avoid))
             tests, action, covered = self._best_rule(waiting, against)
-            rules.append(Rule(tests, action, np.concatenate([waiting, against])))
+            asked = np.flatnonzero(relevant & ~self.policy.goal) if fall_through else None
+            rules.append(Rule(tests, action, np.concatenate([waiting, against]) if asked is None else asked))
             decided[covered] = True
             ours = np.zeros(len(decided), dtype=np.bool_)
             ours[covered] = True

@@ -49,10 +49,18 @@ def synthesize(task: Task, policy: MultiPolicy, limits: Limits) -> Node:
 def in_phases(task: Task, phases: Sequence[tuple[int, MultiPolicy]], limits: Limits) -> Node:
     """Trees for multi-policies that follow one another, each after so many actions of the one before.
     Raises ``LimitReached`` when the time is over."""
-    parts: list[Node] = []
-    for number, (steps, policy) in enumerate(phases, 1):
-        tree = _tree(task, policy, limits, fall_through=number < len(phases))
-        parts.append(ControlNode("", "retry", (tree,), attempts=steps))  # rule 8
+    parts = [
+        _tree(task, policy, limits, fall_through=number < len(phases))
+        for number, (_, policy) in enumerate(phases, 1)
+    ]
+    return one_after_another(task, [steps for steps, _ in phases], parts)
+
+
+def one_after_another(task: Task, steps: Sequence[int], trees: Sequence[Node]) -> Node:
+    """Trees that follow one another, each after so many actions of the one before (rule 8)."""
+    parts = [
+        ControlNode("", "retry", (tree,), attempts=most) for most, tree in zip(steps, trees, strict=True)
+    ]
     return numbered(control("fallback", parts) if parts else ConditionNode("", task.goal))
 
 
@@ -65,8 +73,8 @@ def _tree(task: Task, policy: MultiPolicy, limits: Limits, *, fall_through: bool
     nowhere = np.zeros_like(unknown)
     learner = Learner(task, policy, limits)
     ending = ~policy.having()
-    watching = learner.learn(unknown, nowhere)
-    acting = learner.learn(false, unknown & ending)
+    watching = learner.learn(unknown, nowhere, fall_through=fall_through)
+    acting = learner.learn(false, unknown & ending, fall_through=fall_through)
     node = goal_node(task, policy.values[learner.relevant()])
     build = _Builder(task, policy.values, limits)
     if watching:  # rule 2
