@@ -66,9 +66,11 @@ def verify(tree: Tree, limits: Limits, engine: Engine = "auto", hidden: Task | N
     """Recompute the figures of a tree. ``auto`` asks Storm, too, where it is installed. ``hidden`` is the
     task with hidden facts that the task of the tree stands for: our own solver looks at its worlds, too.
 
-    Raises ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer; what
-    disagrees stands in the verdict.
+    Raises ``LimitReached``, :class:`BbtcError` where Storm is wanted and cannot answer, and ``ValueError``
+    for a tree whose own task hides facts; what disagrees stands in the verdict.
     """
+    if tree.task.components:
+        raise ValueError("the task hides facts: give one that it stands for, and this one as `hidden`")
     own = found = worlds = None
     if engine != "storm":
         own = recompute(explore(solvable_chain(tree.task, tree.root), limits), limits)
