@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 _HOLD_HIDDEN = {"json", "yaml"}
 """Formats that hold what is hidden."""
+_RUN = {"py_trees", "py_trees_robot", "btcpp_project"}
+"""Formats that run on a robot: they take a monitor along."""
 _MOST_LISTED = 8  # problems that a hint names
 _LAST_STEPS = 0.04
 """Of the time for planning, what is left for the steps that make a tree of what was found."""
@@ -518,6 +520,16 @@ def without_hidden(tree: Tree, limits: Limits) -> Tree:
     return replace(tree, task=lowered(tree.task, tree.root, limits))
 
 
+def with_monitor(tree: Tree, limits: Limits) -> Tree | None:
+    """The tree with a monitor, and with a task that tells what is true (:mod:`bbtc.belief.monitored`); None
+    where it needs none. Raises ``LimitReached``."""
+    if not tree.task.components and tree.task.origin is None:
+        return None
+    from bbtc.belief.monitored import monitored
+
+    return monitored(tree, limits)
+
+
 def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limits) -> Artefact:
     """The tree in an export format, the same whether it was just planned or read from a file. Raises
     :class:`BbtcError` for an unknown format or option and for a tree the format cannot hold."""
@@ -527,7 +539,8 @@ def export_tree(tree: Tree, form: str, options: Mapping[str, str], limits: Limit
     tree = carried(tree)
     exporter = load_exporter(form)
     if exporter.name not in _HOLD_HIDDEN:
-        tree = without_hidden(tree, limits)
+        watched = with_monitor(tree, limits) if exporter.name in _RUN else None
+        tree = watched or without_hidden(tree, limits)
     parsed = parse_options(exporter, options)
     reached = None
     if parsed.get("flow"):

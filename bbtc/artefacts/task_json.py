@@ -82,6 +82,8 @@ def task_to_json(task: Task) -> Json:
     value["goal"] = condition_to_json(task.goal, task.variables)
     if task.components:
         value["components"] = [_component_to_json(component, task) for component in task.components]
+    if task.origin is not None:
+        value["origin"] = task_to_json(task.origin)
     value["actions"] = [_action_to_json(action, task) for action in task.actions]
     if task.templates:
         value["templates"] = [_template_to_json(template, task.variables) for template in task.templates]
@@ -272,7 +274,7 @@ def read_task(at: At, faults: Faults) -> Task:
     check_header(at, FORMAT, VERSION)
     members = at.members(
         ["format", "version", "domain", "problem", "variables", "initial", "goal", "actions"],
-        ["goal_probability", "goal_reward", "metric", "templates", "signatures", "components"],
+        ["goal_probability", "goal_reward", "metric", "templates", "signatures", "components", "origin"],
     )
     variables = faults.each(members["variables"].elements(), _variable)
     faults.stop_if_any()  # every mention of a variable would be a fault of its own
@@ -310,6 +312,7 @@ def read_task(at: At, faults: Faults) -> Task:
             )
         ),
         components=components,
+        origin=read_task(members["origin"], faults) if "origin" in members else None,
     )
     faults.stop_if_any()
     _check_sum(members["initial"], [state.probability for state in task.initial])
@@ -319,8 +322,7 @@ def read_task(at: At, faults: Faults) -> Task:
 
 
 _TEMPLATE_FIELDS = ("name", "template", "args", "precondition", "body")
-_ZERO = Fraction(0)
-_ONE = Fraction(1)
+_ZERO, _ONE = Fraction(0), Fraction(1)
 
 
 def _optional(members: Mapping[str, At], name: str) -> list[At]:

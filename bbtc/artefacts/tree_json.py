@@ -56,8 +56,13 @@ _BOUNDS = ("lower", "upper")
 def carried(tree: Tree) -> Tree:
     """The tree with as much of its task as it carries along."""
     used = {node.action for node in actions_of(tree.root)}
-    actions = tuple(action for action in tree.task.actions if action.name in used)
-    return replace(tree, task=replace(tree.task, actions=actions, templates=()))
+
+    def part(task: Task) -> Task:
+        actions = tuple(action for action in task.actions if action.name in used)
+        origin = None if task.origin is None else part(task.origin)
+        return replace(task, actions=actions, templates=(), origin=origin)
+
+    return replace(tree, task=part(tree.task))
 
 
 def tree_to_json(tree: Tree) -> Json:

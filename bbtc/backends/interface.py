@@ -12,7 +12,7 @@ from bbtc.backends.names import Symbol, parameter_names
 from bbtc.backends.shape import normal
 from bbtc.ground.condition import TRUE, Condition, variables
 from bbtc.ground.task import GroundAction, Task, Variable
-from bbtc.tree.nodes import ActionNode, ConditionNode, Node, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +26,18 @@ class Leaf:
 
 @dataclass(frozen=True)
 class Interface:
-    """The leaves a tree uses, sorted by name; ``reads`` are the variables that conditions and guards read."""
+    """The leaves a tree uses, sorted by name; ``reads`` are the variables that conditions and guards ask the
+    robot for; the conditions of ``deduced`` ask the monitor alone."""
 
     conditions: tuple[Leaf, ...]
     actions: tuple[Leaf, ...]
     reads: tuple[int, ...] = ()
+    deduced: frozenset[Symbol] = frozenset()
+
+    @property
+    def asked(self) -> tuple[Leaf, ...]:
+        """The conditions that the robot answers."""
+        return tuple(leaf for leaf in self.conditions if leaf.symbol not in self.deduced)
 
     @cached_property
     def leaves(self) -> dict[Symbol, Leaf]:
@@ -56,8 +63,10 @@ def guard_of(task: Task, node: ActionNode) -> Condition | None:
     return None if guard == TRUE else guard
 
 
-def interface_of(task: Task, root: Node) -> Interface:
-    """The interface of a tree: what its conditions, guards and actions refer to."""
+def interface_of(tree: Tree) -> Interface:
+    """The interface of a tree: what its conditions, guards and actions refer to, and what its monitor asks
+    for."""
+    task, root = tree.task, tree.root
     read: dict[int, None] = {}
     actions: dict[Symbol, None] = {}
     for node in walk(root):
@@ -68,15 +77,20 @@ def interface_of(task: Task, root: Node) -> Interface:
             guard = guard_of(task, node)
             if guard is not None:
                 read.update(dict.fromkeys(variables(guard)))
+    told = frozenset[int]() if tree.monitor is None else tree.monitor.known
+    asked = [index for index in read if index not in told]
+    asked += [] if tree.monitor is None else sorted(tree.monitor.seen.difference(asked))
     unknowable: dict[Symbol, bool] = {}
-    for index in read:
+    for index in [*asked, *read]:
         variable = task.variables[index]
         symbol = variable_symbol(variable)
         unknowable[symbol] = unknowable.get(symbol, False) or variable.three_valued
     return Interface(
         tuple(Leaf(s, parameters_of(task, s), unknowable[s]) for s in sorted(unknowable)),
         tuple(Leaf(s, parameters_of(task, s)) for s in sorted(actions)),
-        tuple(sorted(read)),
+        tuple(sorted(asked)),
+        frozenset(variable_symbol(task.variables[index]) for index in read)
+        - frozenset(variable_symbol(task.variables[index]) for index in asked),
     )
 
 

@@ -30,7 +30,7 @@ def actions_used(tree: Tree) -> list[GroundAction]:
 
 
 def relevant_variables(tree: Tree) -> list[int]:
-    """What the tree or an effect reads, or an action of the tree sets."""
+    """What the tree, an effect or an observation reads, or an action of the tree sets."""
     task = tree.task
     found: set[int] = set()
     for node in walk(tree.root):
@@ -43,6 +43,11 @@ def relevant_variables(tree: Tree) -> list[int]:
             found.update(index for index, _ in effect.sets)
             if effect.when is not None:
                 found.update(variables(normal(task, effect.when)))
+    if tree.monitor is not None:
+        found |= tree.monitor.seen | tree.monitor.known | tree.monitor.drawn
+        for telling in tree.monitor.tellings:
+            found.update(variables(telling.observation.condition))
+            found.update(variables(telling.observation.when or TRUE))
     return sorted(found)
 
 

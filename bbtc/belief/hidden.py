@@ -227,14 +227,12 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
     """A change of hidden facts as a function from the values of a state to what may come of it: what is
     believed and known then, and the seen variables that it sets. Costs and rewards that the robot cannot see
     are expected ones."""
-    component = task.components[change.component]
-    beliefs, kernel = beliefs_of(component), _Kernel(component, change, spend)
+    readings = Readings(task, change, spend)
     first = place_of(task, change.component)
-    facts = len(component.facts)
     cache: dict[tuple[int, bytes], dict[Draw, Fraction]] = {}
 
     def draw(values: Values) -> dict[Draw, Fraction]:
-        number = int.from_bytes(values[first : first + PLACES], "big")
+        number = number_in(task, values, change.component)
         seen = bytes(values[variable] for variable in change.seen)
         found = cache.get((number, seen))
         if found is None:
@@ -242,27 +240,77 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
         return found
 
     def results(number: int, seen: bytes) -> dict[Draw, Fraction]:
-        belief = beliefs.by_number[number]
-        by_told = kernel.certain(belief, seen)
-        amounts: dict[_Told, tuple[Fraction, Fraction]] = {}
-        scale = 1
-        if by_told is None:
-            by_told, amounts, scale = kernel.drawn(belief, seen)
-        total = scale * sum(weight for _, weight in belief)
         drawn: dict[Draw, Fraction] = {}
-        for told, mass in by_told.items():
-            whole = sum(mass.values())
-            after = beliefs.number(mass)
-            cost, reward = amounts.get(told, (ZERO, ZERO))
-            sets = [(change.seen[local - facts], value) for local, value in told if local >= 0]
-            sets += beliefs.known(after)
-            sets += [(first + at, octet) for at, octet in enumerate(after.to_bytes(PLACES, "big"))]
-            key = tuple(sorted(sets)), cost / whole, reward / whole
-            drawn[key] = drawn.get(key, ZERO) + Fraction(whole, total)
-        spend(len(belief), len(drawn))
+        for reading in readings.after(number, seen):
+            sets = [(change.seen[at], value) for at, value in reading.shown]
+            sets += readings.beliefs.known(reading.belief)
+            sets += [(first + at, octet) for at, octet in enumerate(reading.belief.to_bytes(PLACES, "big"))]
+            key = tuple(sorted(sets)), reading.cost, reading.reward
+            drawn[key] = drawn.get(key, ZERO) + reading.probability
+        spend(len(drawn), len(drawn))
         return drawn
 
     return draw
+
+
+class Reading(NamedTuple):
+    """One thing that the robot may be told by a change: what it sees of the seen variables, by their place in
+    :attr:`Change.seen`, where they change; what the observations that were made told, by number; the number
+    of what is believed then; the probability, and expected cost and reward."""
+
+    shown: Delta
+    told: Delta
+    belief: int
+    probability: Fraction
+    cost: Fraction
+    reward: Fraction
+
+
+class Readings:
+    """What the robot may be told by a change of hidden facts, and what it believes then."""
+
+    def __init__(self, task: Task, change: Change, spend: Spend) -> None:
+        component = task.components[change.component]
+        self.beliefs = beliefs_of(component)
+        self._kernel = _Kernel(component, change, spend)
+        self._facts = len(component.facts)
+        self._spend = spend
+
+    def after(self, number: int, seen: bytes) -> Iterator[Reading]:
+        """What may be told where this was believed, and the seen variables had these values."""
+        belief = self.beliefs.by_number[number]
+        by_told = self._kernel.certain(belief, seen)
+        amounts: dict[_Told, tuple[Fraction, Fraction]] = {}
+        scale = 1
+        if by_told is None:
+            by_told, amounts, scale = self._kernel.drawn(belief, seen)
+        total = scale * sum(weight for _, weight in belief)
+        self._spend(len(belief), len(by_told))
+        for told, mass in by_told.items():
+            whole = sum(mass.values())
+            cost, reward = amounts.get(told, (ZERO, ZERO))
+            shown, observed = self._split(told)
+            yield Reading(
+                shown,
+                observed,
+                self.beliefs.number(mass),
+                Fraction(whole, total),
+                cost / whole,
+                reward / whole,
+            )
+
+    def in_world(self, number: int, seen: bytes, world: int) -> Iterator[tuple[Delta, int, int, Fraction]]:
+        """What may happen in one world: what is seen of the seen variables, what is believed then, the world
+        after, and the probability."""
+        beliefs = {(reading.shown, reading.told): reading.belief for reading in self.after(number, seen)}
+        for part in self._kernel.of(world, seen):
+            shown, told = self._split(part.told)
+            yield shown, beliefs[shown, told], part.world, part.probability
+
+    def _split(self, told: _Told) -> tuple[Delta, Delta]:
+        """What is seen of the seen variables, and what the observations told."""
+        shown = tuple((local - self._facts, value) for local, value in told if local >= 0)
+        return shown, tuple((~local, value) for local, value in told if local < 0)
 
 
 class _Part(NamedTuple):

@@ -36,7 +36,7 @@ _NAME = "belief"
 
 
 def lowered(task: Task, root: Node, limits: Limits) -> Task:
-    """The task for the runs of one tree: with the actions that they start, and nothing hidden. Raises
+    """The task for the runs of one tree: with its actions, and nothing hidden. Raises
     :class:`bbtc.diagnostics.LimitReached`."""
     if not task.components:
         return task
@@ -44,11 +44,12 @@ def lowered(task: Task, root: Node, limits: Limits) -> Task:
     codes = _codes(task, chain)
     starts = distribution((_coded(task, codes, chain.states[at].values), p) for p, at in chain.initial)
     made = _Tables(task, codes, chain, limits)
+    named = {node.action for node in chain.actions}  # some may never be started
     return replace(
         task,
         variables=(*task.variables, *(variable for code in codes for variable in code.variables)),
         initial=tuple(InitialState(p, tuple(map(Truth, values))) for values, p in starts.items()),
-        actions=tuple(made.action(action) for action in task.actions if action.name in made.asked),
+        actions=tuple(made.action(action) for action in task.actions if action.name in named),
         templates=(),
         components=(),
     )
@@ -104,11 +105,11 @@ class _Tables:
 
     def __init__(self, task: Task, codes: Sequence[_Code], chain: Chain, limits: Limits) -> None:
         self._task, self._codes, self._limits = task, codes, limits
-        self.asked: dict[str, dict[Values, None]] = {}
+        self._asked: dict[str, dict[Values, None]] = {}
         """By action: the states it is started in."""
         for state, number in zip(chain.states, chain.action, strict=True):
             if number >= 0:
-                self.asked.setdefault(chain.actions[number].action, {})[state.values] = None
+                self._asked.setdefault(chain.actions[number].action, {})[state.values] = None
 
     def action(self, action: GroundAction) -> GroundAction:
         """An action with its changes as factors."""
@@ -116,7 +117,7 @@ class _Tables:
             return action
         factors = [factor for factor in action.factors if factor != NO_CHANGE]
         for change in action.changes:
-            factors += self._factors(change, self.asked[action.name])
+            factors += self._factors(change, self._asked.get(action.name, {}))
         return replace(action, factors=tuple(factors) or (NO_CHANGE,), changes=())
 
     def _factors(self, change: Change, states: Iterable[Values]) -> Iterator[Factor]:

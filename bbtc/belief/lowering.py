@@ -35,8 +35,8 @@ _MOST_SEEN = 16  # combinations of values of the seen variables of a change
 
 
 def lowered(task: Task, limits: Limits) -> Task:
-    """The task without the components that can do without worlds. P*, costs and trees are the same, state by
-    state. Raises :class:`bbtc.diagnostics.LimitReached`."""
+    """The task without the components that can do without worlds, made of the one with them. P*, costs and
+    trees are the same, state by state. Raises :class:`bbtc.diagnostics.LimitReached`."""
     found = {}
     count = len(task.initial)
     changes: list[list[tuple[GroundAction, Change]]] = [[] for _ in task.components]
@@ -49,7 +49,16 @@ def lowered(task: Task, limits: Limits) -> Task:
         if lowering.explored() and count * lowering.beginnings <= limits.initial_states:
             count *= lowering.beginnings
             found[number] = lowering
-    return _without(task, found) if found else task
+    if not found:
+        return task
+    # What one fact alone is known to be is what was read of it.
+    alone = {
+        number: lowering
+        for number, lowering in found.items()
+        if len(task.components[number].facts) == 1 and len(task.components[number].known) == 1
+    }
+    lower = _without(task, found)
+    return lower if len(alone) == len(found) else replace(lower, origin=_without(task, alone))
 
 
 @dataclass(frozen=True, slots=True)

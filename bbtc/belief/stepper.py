@@ -10,6 +10,7 @@ from fractions import Fraction
 from bbtc.belief.draws import Values
 from bbtc.belief.state import State, Transition, compile_action, initial_belief
 from bbtc.belief.tick import STARTED, Memory, NodeStatus, Tick, compile_tick, memory_of
+from bbtc.belief.truth import HiddenTruth, Worlds
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.markov import distribution
@@ -37,6 +38,8 @@ class Moment:
     action: ActionNode | None
     branches: tuple[Branch, ...]
     after: int = 0
+    worlds: Worlds = ()
+    """What is true, where facts are hidden."""
 
 
 @dataclass(slots=True)
@@ -58,8 +61,10 @@ class Stepper:
     _actions: list[ActionNode] = field(init=False)
     _memory: Memory = field(init=False)
     _returned: Tick = field(init=False)
+    truth: HiddenTruth = field(init=False)
 
     def __post_init__(self) -> None:
+        self.truth = HiddenTruth(self.task, self.seed)
         self._actions = list(actions_of(self.root))
         self._memory = memory_of(self.root)
         self._returned = compile_tick(self.task, self.root, self._observe)
@@ -83,14 +88,32 @@ class Stepper:
         """Begin again: in the initial state number ``choice`` (from 0), or in a drawn one."""
         starts = self.starts
         values = starts[self._draw(starts, 0) if choice is None else choice].values
-        self.moments = [self._tick(State(values, 0))]
+        self.moments = [self._tick(State(values, 0), self.truth.first(values))]
 
     def step(self, choice: int | None = None) -> None:
         """Take outcome number ``choice`` (from 0) of the running action, or a drawn one, and tick."""
         moment = self.now
         assert moment.action is not None
-        index = self._draw(moment.branches, len(self.moments)) if choice is None else choice
-        self.moments.append(self._tick(State(moment.branches[index].values, moment.after)))
+        step, action = len(self.moments), moment.action.action
+        index = self._draw(self._really(moment, action), step) if choice is None else choice
+        values = moment.branches[index].values
+        worlds = moment.worlds
+        if worlds:
+            worlds = self.truth.after(action, moment.state.values, worlds, values, step)
+        self.moments.append(self._tick(State(values, moment.after), worlds))
+
+    def _really(self, moment: Moment, action: str) -> Sequence[Branch]:
+        """What may come next, as probable as it is in what is true."""
+        if not moment.worlds:
+            return moment.branches
+        before = moment.state.values
+        return [
+            Branch(
+                branch.probability * self.truth.chance(action, before, moment.worlds, branch.values),
+                branch.values,
+            )
+            for branch in moment.branches
+        ]
 
     def back(self) -> bool:
         """Take the last step back; False at the start."""
@@ -110,11 +133,11 @@ class Stepper:
     def _observe(self, node: Node, returned: int) -> None:
         self._statuses[node.id] = NodeStatus.RUNNING if returned >= STARTED else NodeStatus(returned)
 
-    def _tick(self, state: State) -> Moment:
+    def _tick(self, state: State, worlds: Worlds) -> Moment:
         statuses = self._statuses = {}
         returned = self._returned(state.values, state.finished)
         if returned < STARTED:
-            return Moment(state, statuses, NodeStatus(returned), None, ())
+            return Moment(state, statuses, NodeStatus(returned), None, (), 0, worlds)
         action = self._actions[self._memory.action(returned)]
         if action.action not in self._transitions:
             ground = self.task.action_by_name[action.action]
@@ -122,7 +145,7 @@ class Stepper:
         results = self._transitions[action.action](state.values)
         after = distribution((result.values, result.probability) for result in results)
         remembered = self._memory.after(state.finished, returned)
-        return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(after), remembered)
+        return Moment(state, statuses, NodeStatus.RUNNING, action, _branches(after), remembered, worlds)
 
 
 def _branches(belief: dict[Values, Fraction]) -> tuple[Branch, ...]:

@@ -277,6 +277,9 @@ class Task:
     components: tuple[Component, ...] = ()
     """What is hidden from the robot. The variables that a component's ``known`` names are set by nothing
     else, and have in the initial states the value that the prior gives them before anything is told."""
+    origin: Task | None = None
+    """The task with hidden facts that this was made of, over the same variables, if a robot would have to
+    work out what it knows: its readings stand there."""
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property

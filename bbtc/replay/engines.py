@@ -13,7 +13,7 @@ from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.names import Symbol
 from bbtc.backends.pytrees.exporter import py_trees, py_trees_names
 from bbtc.ground.task import Task, ground_name
-from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing, World
+from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing, Watch, World
 from bbtc.tree.nodes import Tree
 
 
@@ -29,16 +29,20 @@ class Replay(ABC):
         """Replay one script in a new tree."""
         world = self.world = ScriptedWorld(self.task, script, timing)
         self.begin(world)
+        self._watch(world)
         try:
             for _ in range(world.most_ticks()):
                 match self.tick():
                     case "running":
                         world.between_ticks()
                     case "success" | "failure" as ended:
-                        return Run(tuple(world.actions), ended, world.values)
+                        return Run(tuple(world.actions), ended, world.told_values)
         except OffScript:
-            return Run(tuple(world.actions), "cut", world.values)
-        return Run(tuple(world.actions), "endless", world.values)
+            return Run(tuple(world.actions), "cut", world.told_values)
+        return Run(tuple(world.actions), "endless", world.told_values)
+
+    def _watch(self, world: ScriptedWorld) -> None:  # noqa: B027 - most trees have no monitor
+        """Where facts are hidden: let the exported monitor listen to the world."""
 
     def runs(self, jobs: Iterable[tuple[Script, Timing]]) -> list[Run]:
         """Replay many scripts."""
@@ -70,11 +74,10 @@ class PyTreesReplay(Replay):
 
         self._status = engine.common.Status
         self._ended = False
-        self._task = tree.task
+        self._task, self._monitor = tree.task, tree.monitor
         self._names = py_trees_names(tree)
         self.source = py_trees.export(tree, {"runtime": runtime}, None)
-        self._module = types.ModuleType("exported")
-        exec(compile(self.source, "<exported>", "exec"), self._module.__dict__)  # noqa: S102 - our own
+        self._module = _load(self.source)
 
     @property
     def task(self) -> Task:
@@ -123,7 +126,36 @@ class PyTreesReplay(Replay):
         for symbol, method in self._names.methods.items():
             make = condition if symbol.kind == "predicate" else action
             methods[method] = make(symbol.name)
-        return types.SimpleNamespace(**methods)
+        self._namespace = types.SimpleNamespace(**methods)
+        return self._namespace
+
+    def _watch(self, world: ScriptedWorld) -> None:
+        if self._monitor is not None:
+            self._namespace.monitor = monitor_in(self._module, world)
+            world.watch(self._namespace.monitor, self._monitor.known, starts=False)
+
+
+def _load(source: str) -> Any:
+    """An exported module."""
+    module = types.ModuleType("exported")
+    exec(compile(source, "<exported>", "exec"), module.__dict__)  # noqa: S102 - our own
+    return module
+
+
+def exported_module(tree: Tree) -> Any:
+    """The exported module of a tree for py_trees."""
+    return _load(py_trees.export(tree, {"runtime": "embedded"}, None))
+
+
+def monitor_in(module: Any, world: ScriptedWorld) -> Watch:
+    """The monitor of an exported module, which sees what is to be seen in a world."""
+    truth = {0: False, 1: None, 2: True}
+
+    def see(*fact: str) -> bool | None:
+        return truth[world.read(ground_name(fact[0], fact[1:]))]
+
+    monitor: Watch = module.Monitor(module.MONITOR, see)
+    return monitor
 
 
 class BtcppReplay(Replay):
@@ -135,7 +167,9 @@ class BtcppReplay(Replay):
         import behaviortreepy as engine
 
         self._engine = engine
-        self._task = tree.task
+        self._task, self._monitor = tree.task, tree.monitor
+        # What C++ makes of the same table is compared apart: leaves written in Python ask the one in Python.
+        self._module = None if tree.monitor is None else exported_module(tree)
         self._names = btcpp_names(tree)
         self.source = btcpp.export(tree, {}, None) if source is None else source
         self._factory = engine.BehaviorTreeFactory()
@@ -176,6 +210,10 @@ class BtcppReplay(Replay):
             return "running"
         assert returned in (status.SUCCESS, status.FAILURE)
         return "success" if returned == status.SUCCESS else "failure"
+
+    def _watch(self, world: ScriptedWorld) -> None:
+        if self._monitor is not None:
+            world.watch(monitor_in(self._module, world), self._monitor.known, starts=True)
 
     def halt_all(self) -> None:
         """The engine's ``haltTree()``, which runs the ``_onHalted`` of every node, running or not."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib.util import find_spec
 from itertools import islice
 from types import MappingProxyType
 
 from bbtc.belief.chain import explore
+from bbtc.belief.monitored import with_hidden
 from bbtc.belief.scenarios import scenarios
 from bbtc.limits import Limits
+from bbtc.pipeline import with_monitor, without_hidden
 from bbtc.replay.script import TIMINGS, run_of, script_of
+from bbtc.replay.tellings import Tellings
 from bbtc.tree.nodes import Tree
 
 ENGINES = MappingProxyType({"py_trees": "py_trees", "btcpp": "behaviortreepy"})
@@ -30,10 +34,18 @@ def difference(tree: Tree, form: str, limits: Limits, most: int = 200) -> str | 
     """
     from bbtc.replay.engines import BtcppReplay, PyTreesReplay
 
+    exported = with_monitor(tree, limits)
+    told = None if exported is None else Tellings(tree.task, exported)
+    if exported is None:
+        exported = tree = without_hidden(tree, limits)
+    else:
+        tree = replace(tree, task=with_hidden(tree.task))
     chain = explore(tree.task, tree.root, limits)
-    replay = PyTreesReplay(tree) if form == "py_trees" else BtcppReplay(tree)
+    replay = PyTreesReplay(exported) if form == "py_trees" else BtcppReplay(exported)
     for number, scenario in enumerate(islice(scenarios(chain, limits), most), 1):
         expected, script = run_of(scenario), script_of(scenario)
+        if told is not None:
+            expected, script = told.run(expected), told.script(scenario)
         for timing in TIMINGS:
             found = replay.run(script, timing)
             if found != expected:

@@ -4,6 +4,7 @@ runtime=imported``, they import it from here. It needs py_trees (2.2 or later) a
 from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
+from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, watched
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -35,12 +36,18 @@ __all__ = [
     "Condition",
     "Fact",
     "Factor",
+    "HiddenWorld",
     "Latch",
+    "Monitor",
+    "Move",
     "Outcome",
+    "Part",
     "Retry",
     "Skipper",
     "State",
+    "StopOutside",
     "StopWhenBlocked",
+    "Telling",
     "Try",
     "UntilSuccess",
     "When",
@@ -60,4 +67,5 @@ __all__ = [
     "simulate",
     "skipper",
     "until_success",
+    "watched",
 ]

@@ -15,6 +15,7 @@ from typing_extensions import assert_never
 
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
+from bbtc.tree.monitor import Monitor
 from bbtc.tree.notebook import picture
 
 ControlKind: TypeAlias = Literal["sequence", "fallback", "skipper", "retry", "retry-until-success"]
@@ -95,7 +96,8 @@ class Tree:
     """A tree with the task its conditions and actions refer to, and the planner's claim.
 
     ``success_probability`` is exact; ``target`` is the probability that was asked for. ``bounds``,
-    where known, hold the best probability that any policy could reach.
+    where known, hold the best probability that any policy could reach. With a ``monitor``, the task tells
+    what is true, and the monitor what is known of it.
     """
 
     task: Task
@@ -104,6 +106,7 @@ class Tree:
     target: Fraction
     status: PlanStatus
     bounds: tuple[Fraction, Fraction] | None = None
+    monitor: Monitor | None = None
 
     def _repr_svg_(self) -> str | None:
         """The tree as a picture, for notebooks."""

@@ -294,7 +294,8 @@ def ros_package(folder: Path, tree: Tree, leaves: str) -> Path:
                 {f"{package.group(1)}/{kind}/{snake(file.stem)}.hpp": interface(file, package.group(1))},
             )
             made += 1
-    assert made == 2 + len({action_symbol(action) for action in actions_used(tree)})
+    messages = 2 if tree.monitor is None else 3
+    assert made == messages + len({action_symbol(action) for action in actions_used(tree)})
     return folder
 
 
@@ -392,7 +393,7 @@ def interface(file: Path, package: str) -> str:
     """The C++ that ROS 2 would make of the definition of an interface, as far as needed."""
     types = {"string": "std::string", "uint8": "std::uint8_t", "bool": "bool"}
     types |= {f"{name}[]": f"std::vector<{of}>" for name, of in types.items()} | {
-        "Belief[]": "std::vector<Belief>"
+        f"{name}[]": f"std::vector<{package}::msg::{name}>" for name in ("Belief", "Reading")
     }
     parts = [[]] if file.suffix == ".msg" else [[], []]  # type: ignore[var-annotated]
     number = 0
@@ -414,7 +415,8 @@ def interface(file: Path, package: str) -> str:
     body = "\n".join(structs)
     if file.suffix != ".msg":
         body = f"struct {file.stem} {{\n{body}\n}};"
-    include = f'#include "{package}/msg/belief.hpp"\n' if "Belief[]" in file.read_text() else ""
+    used = [name for name in ("Belief", "Reading") if f"{name}[]" in file.read_text()]
+    include = "".join(f'#include "{package}/msg/{name.lower()}.hpp"\n' for name in used)
     return (
         "#pragma once\n#include <cstdint>\n#include <memory>\n#include <string>\n#include <vector>\n"
         f"{include}namespace {package}::{file.suffix[1:]} {{\n{body}\n}}\n"

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 
+import bbtc
 from bbtc.backends.pytrees.exporter import py_trees_names
 from bbtc.backends.pytrees.pycode import call, layout, literal
 from bbtc.backends.pytrees.runtime import MODULES, used_in
@@ -25,10 +26,12 @@ from bbtc.belief.state import compile_action, initial_belief
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.pipeline import with_monitor
 from bbtc.replay.engines import PyTreesReplay
 from bbtc.replay.script import Run, Script
 from bbtc.tree.nodes import Tree, actions_of
 from tests.backends.test_btcpp import nested
+from tests.belief.hidden_tasks import search, tiger
 from tests.conftest import Golden
 from tests.profiles import examples
 from tests.replay.random_trees import random_tree
@@ -58,6 +61,13 @@ def test_the_soda_tree(golden: Golden) -> None:
     golden("export/soda_robot.py", export(soda_tree(), "py_trees_robot"))
 
 
+def watched(task: Task) -> Tree:
+    """A tree of a task with hidden facts, with its monitor."""
+    tree = with_monitor(bbtc.plan(task, target=Fraction(9, 10)).tree, Limits())
+    assert tree is not None
+    return tree
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Exported modules that use everything, with their classes in them and imported, and a robot
@@ -68,6 +78,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         soda_tree(),
         nested(60, ("sequence", "fallback")),
         *(random_tree(seed, 0.6) for seed in range(12)),
+        *map(watched, (tiger(Fraction(17, 20), Fraction(96, 100)), search(3))),
     ]
     for number, tree in enumerate(made):
         for runtime in ("embedded", "imported"):

@@ -6,10 +6,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bbtc.backends.btcpp import cppcode
+from bbtc.backends.btcpp.monitor import MonitorTable, key_code
 from bbtc.backends.btcpp.names import BtcppNames
 from bbtc.backends.btcpp.palette import port_code, signature
-from bbtc.backends.interface import Leaf
+from bbtc.backends.interface import Leaf, variable_symbol
 from bbtc.ground.task import Task
+from bbtc.tree.monitor import Monitor
 
 _ROBOT = """\
 // What the tree needs of a robot. Made by bbtc; no need to edit it.
@@ -73,6 +75,11 @@ inline std::string argument(const BT::TreeNode& node, const std::string& port) {
 }
 """
 """C++ that every flavour of the leaves begins with."""
+
+_INCLUDE_MONITOR = """\
+#include "monitor_table.hpp"
+
+#include <behavior"""
 
 _LEAVES = (
     """\
@@ -171,6 +178,104 @@ class NAME : public BT::StatefulActionNode {
 """
 
 
+_KNOWN_CONDITION = """\
+class NAME : public BT::ConditionNode {
+ public:
+  NAME(const std::string& name, const BT::NodeConfig& config, Robot* robot)
+      : BT::ConditionNode(name, config), robot_(robot) {}
+
+  static BT::PortsList providedPorts() { return PORTS; }
+
+ private:
+  BT::NodeStatus tick() override {
+    const std::string fact = KEY;
+    return KNOWN;
+  }
+
+  Robot* robot_;
+};
+"""
+
+_WATCHED_ACTION = """\
+class NAME : public BT::StatefulActionNode {
+ public:
+  NAME(const std::string& name, const BT::NodeConfig& config, Robot* robot)
+      : BT::StatefulActionNode(name, config), robot_(robot) {}
+
+  static BT::PortsList providedPorts() { return PORTS; }
+
+ private:
+  BT::NodeStatus onStart() override {
+    if (!robot_->monitor().outside().empty()) {
+      return BT::NodeStatus::FAILURE;
+    }
+    robot_->monitor().begin(KEY);
+    return onRunning();
+  }
+  BT::NodeStatus onRunning() override { return robot_->METHOD(ARGUMENTS); }
+  void onHalted() override { robot_->CANCEL(ARGUMENTS); }
+
+  Robot* robot_;
+};
+"""
+
+MONITOR_ACCESS = (
+    ACCESS.replace(
+        """\
+                          const std::function<bool()>& ready = [] { return true; }) {
+""",
+        """\
+                          const Monitor& monitor,
+                          const std::function<bool()>& ready = [] { return true; }) {
+""",
+    )
+    .replace(
+        """\
+    if (ready()) {
+""",
+        """\
+    if (!monitor.outside().empty()) {
+      tree.haltTree();
+      status = BT::NodeStatus::FAILURE;
+    } else if (ready() && !monitor.waits()) {
+""",
+    )
+    .replace(
+        """\
+inline BT::NodeStatus run(""",
+        """\
+/// Where the monitor says that what happened is outside the model, the tree fails. Before its first tick it
+/// waits for what the robot is told before its first action.
+inline BT::NodeStatus run(""",
+    )
+)
+"""The same with a monitor."""
+
+_MONITOR_MEMBER = """\
+
+  Robot() = default;
+  Robot(const Robot&) = delete;
+  Robot& operator=(const Robot&) = delete;
+
+  /// Knows what is hidden from what the robot is told. Call `told` for each of these, in the moment in which
+  /// its effects are seen, with what its observations told:TELLINGS
+  Monitor& monitor() { return monitor_; }
+"""
+
+_SEE = """\
+
+ private:
+  /// What the monitor asks for.
+  std::optional<bool> see(const std::string& fact) {
+SEEN
+    return std::nullopt;
+  }
+
+  Monitor monitor_{monitorTable(), [this](const std::string& fact) { return see(fact); }};
+};
+"""
+
+
 @dataclass(frozen=True, slots=True)
 class Program:
     """What a program is called: its package, the C++ namespace of its leaves, and the tree it runs; and
@@ -186,7 +291,10 @@ class LeafWriter:
     """Writes the C++ of the leaves. Class and method names are ids with a word added, so that none is a
     keyword or a macro."""
 
-    def __init__(self, task: Task, names: BtcppNames, program: Program) -> None:
+    def __init__(
+        self, task: Task, names: BtcppNames, program: Program, monitor: Monitor | None = None
+    ) -> None:
+        self._monitor = monitor
         self._task = task
         self._program = program
         self._space = program.space
@@ -219,10 +327,17 @@ class LeafWriter:
         """Conditions, then actions."""
         return [*self._names.interface.conditions, *self._names.interface.actions]
 
+    def asked(self) -> list[Leaf]:
+        """Those that the robot answers: conditions, then actions."""
+        return [*self._names.interface.asked, *self._names.interface.actions]
+
     def robot(self) -> str:
         """``robot.hpp``: the interface of the robot."""
-        lines = [self._open(_ROBOT)]
-        for leaf in self.leaves():
+        if self._monitor is None:
+            lines = [self._open(_ROBOT)]
+        else:
+            lines = [self._open(_ROBOT.replace("#include <behavior", _INCLUDE_MONITOR)), *self._watching()]
+        for leaf in self.asked():
             said = cppcode.comment(signature(leaf))
             if leaf.symbol.kind == "action":
                 lines += ["", f"  /// Start or continue {said}."]
@@ -232,12 +347,36 @@ class LeafWriter:
                 unknown = "; nothing where that is unknown" if leaf.three_valued else ""
                 lines += ["", f"  /// Whether {said} holds{unknown}."]
                 lines += [f"  virtual {self.declaration(leaf, self.method(leaf))} = 0;"]
-        return "\n".join([*lines, "};", "", *self._close()])
+        end = ["};"] if self._monitor is None else [self._seen(self._monitor).rstrip("\n")]
+        return "\n".join([*lines, *end, "", *self._close()])
+
+    def _watching(self) -> list[str]:
+        """The access to the monitor."""
+        assert self._monitor is not None
+        table = MonitorTable(self._task, self._names, self._monitor)
+        told = ""
+        for action, readings in self._monitor.readings.items():
+            listed = ", ".join(map(cppcode.literal, readings)) or "nothing but that it was done"
+            name = cppcode.comment(cppcode.literal(table.action(action)))
+            told += f"\n  ///   {name}: {cppcode.comment(listed)}"
+        return [_MONITOR_MEMBER.replace("TELLINGS", told).rstrip("\n")]
+
+    def _seen(self, monitor: Monitor) -> str:
+        """What the monitor asks the robot for."""
+        table = MonitorTable(self._task, self._names, monitor)
+        lines = []
+        for index in sorted(monitor.seen):
+            read = self._task.variables[index]
+            leaf = self._names.interface.leaves[variable_symbol(read)]
+            args = ", ".join(cppcode.literal(self._names.values[arg]) for arg in read.args)
+            lines += [f"    if (fact == {cppcode.literal(table.fact(index))}) {{"]
+            lines += [f"      return {self.method(leaf)}({args});", "    }"]
+        return cppcode.fill(_SEE, SEEN="\n".join(lines) or "    (void)fact;")
 
     def header(self) -> str:
         """``leaves.hpp``: the classes, and the function that registers them."""
         words = {"ROBOT_TREE": self._space, "MAIN_TREE": cppcode.literal(self._program.main_tree)}
-        head = _LEAVES
+        head = _LEAVES if self._monitor is None else _LEAVES.replace(ACCESS, MONITOR_ACCESS)
         if self._program.our_nodes:
             head = head.replace('#include "robot.hpp"', '#include "bbtc_nodes.hpp"\n#include "robot.hpp"')
         blocks = [cppcode.fill(head, **words), *(self._class(leaf) for leaf in self.leaves())]
@@ -262,7 +401,7 @@ class LeafWriter:
     def stub(self) -> str:
         """``robot_stub.hpp``: a robot that knows and can do nothing yet."""
         lines = [self._open(_STUB)]
-        for leaf in self.leaves():
+        for leaf in self.asked():
             if leaf.symbol.kind == "action":
                 # Said aloud: a tree that tries without end would else be silent without end.
                 words = [cppcode.literal(f"to do: {self.method(leaf)}")]
@@ -282,14 +421,37 @@ class LeafWriter:
 
     def _class(self, leaf: Leaf) -> str:
         told = f"/// {cppcode.comment(signature(leaf))}\n"
+        text = _ACTION if leaf.symbol.kind == "action" else _CONDITION
+        more: dict[str, str] = {}
+        if self._monitor is not None:
+            text, more = self._with_monitor(leaf)
         return told + cppcode.fill(
-            _ACTION if leaf.symbol.kind == "action" else _CONDITION,
+            text,
+            **more,
             NAME=self.class_name(leaf),
             METHOD=self.method(leaf),
             CANCEL=self.cancel(leaf),
             ARGUMENTS=", ".join(f"argument(*this, {cppcode.literal(port)})" for port in leaf.parameters),
             PORTS=port_code(self._task, self._names, leaf),
         )
+
+    def _with_monitor(self, leaf: Leaf) -> tuple[str, dict[str, str]]:
+        """The class of a leaf that asks the monitor, and what to fill in."""
+        key = key_code(self._names, leaf, [f"argument(*this, {cppcode.literal(p)})" for p in leaf.parameters])
+        if leaf.symbol.kind == "action":
+            return _WATCHED_ACTION, {"KEY": key}
+        if leaf.symbol in self._names.interface.deduced:
+            return _KNOWN_CONDITION, {"KEY": key, "KNOWN": "statusOf(robot_->monitor().value(fact))"}
+        if not any(
+            variable_symbol(self._task.variables[index]) == leaf.symbol
+            for index in (self._monitor.known if self._monitor is not None else ())
+        ):
+            return _CONDITION, {}
+        known = (
+            "statusOf(robot_->monitor().knows(fact) ? robot_->monitor().value(fact)\n"
+            "                                                : robot_->METHOD(ARGUMENTS))"
+        )
+        return _KNOWN_CONDITION.replace("KNOWN", known), {"KEY": key}
 
     def _open(self, text: str) -> str:
         return cppcode.fill(text, ROBOT_TREE=self._space).rstrip()

@@ -45,7 +45,7 @@ class BtcppNames:
 def btcpp_names(tree: Tree, namespace: str = "") -> BtcppNames:
     """The names used in the export of a tree. ``namespace`` is any text; its CamelCase form comes
     before every id."""
-    interface = interface_of(tree.task, tree.root)
+    interface = interface_of(tree)
     prefix = camel(namespace) if namespace else ""
     plain = identifiers(interface.leaves, "camel", _reserved(prefix))
     ids = {symbol: f"{prefix}{name}" for symbol, name in plain.items()}

@@ -14,6 +14,7 @@ from importlib import resources
 from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.leaves import LeafWriter, Program
+from bbtc.backends.btcpp.monitor import monitor_files
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of
 from bbtc.backends.btcpp.palette import btcpp_palette
@@ -69,10 +70,10 @@ btcpp_project = BtcppProjectExporter()
 
 
 def _plain_files(tree: Tree, names: BtcppNames, program: Program) -> dict[str, str]:
-    leaves = LeafWriter(tree.task, names, program)
+    leaves = LeafWriter(tree.task, names, program, tree.monitor)
     cmake = _CMAKE + (_CMAKE_PLUGIN if program.our_nodes else "")
     space = program.space
-    return {
+    files = {
         "CMakeLists.txt": cppcode.fill(cmake, PACKAGE=program.package),
         "README.md": _README,
         "robot.hpp": leaves.robot(),
@@ -83,6 +84,14 @@ def _plain_files(tree: Tree, names: BtcppNames, program: Program) -> dict[str, s
         "simulated_robot.hpp": SimulatedRobotWriter(tree, names, leaves, space).header(),
         "simulate.cpp": cppcode.fill(_static("simulate.cpp"), ROBOT_TREE=space),
     }
+    if tree.monitor is not None:
+        files |= monitor_files(tree.task, names, tree.monitor, space)
+        files["hidden_world.hpp"] = cppcode.fill(_static("hidden_world.hpp"), ROBOT_TREE=space)
+        files["main.cpp"] = files["main.cpp"].replace("milliseconds(100))", f"milliseconds(100), {_OUTSIDE}")
+        # What is hidden is kept in the same state.
+        files["simulated_world.hpp"] = files["simulated_world.hpp"].replace(" private:", " protected:")
+        files["README.md"] += _README_MONITOR
+    return files
 
 
 def _static(name: str) -> str:
@@ -123,6 +132,17 @@ _CMAKE_PLUGIN = """
 add_library(bbtc_nodes SHARED bbtc_nodes_plugin.cpp)
 target_compile_definitions(bbtc_nodes PRIVATE BT_PLUGIN_EXPORT)
 target_link_libraries(bbtc_nodes ${engine})
+"""
+
+_OUTSIDE = """\
+robot.monitor());
+    if (!robot.monitor().outside().empty()) {
+      std::cout << robot.monitor().outside() << '\\n';
+    }"""
+
+_README_MONITOR = """\
+| `monitor*.hpp` | what is known of hidden facts, by what the robot tells `monitor()` |
+| `hidden_world.hpp` | the simulated world's hidden facts, and what is told of them |
 """
 
 _README = """\

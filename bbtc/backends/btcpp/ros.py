@@ -8,40 +8,64 @@ import re
 
 from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.leaves import ACCESS, Program
+from bbtc.backends.btcpp.monitor import key_code, monitor_files
 from bbtc.backends.btcpp.names import BtcppNames
 from bbtc.backends.btcpp.palette import port_code, signature
+from bbtc.backends.btcpp.ros_monitor import (
+    FIRST_READINGS,
+    READING,
+    README,
+    watched,
+    watched_head,
+    watched_main,
+)
 from bbtc.backends.exporter import Begun
-from bbtc.backends.interface import Leaf
+from bbtc.backends.interface import Leaf, action_symbol
 from bbtc.backends.names import Symbol
 from bbtc.ground.task import Task
+from bbtc.tree.monitor import FIRST
 from bbtc.tree.nodes import Tree
 
 
 def ros_files(tree: Tree, names: BtcppNames, program: Program, services: bool) -> dict[str, str]:
     """The files of the package, by name. Actions are ROS actions, or else ``services``."""
-    writer = _RosWriter(tree.task, names, program, services)
+    writer = _RosWriter(tree, names, program, services)
     files = {
         "CMakeLists.txt": writer.cmake(),
         "package.xml": cppcode.fill(_PACKAGE_XML, PACKAGE=program.package),
         "README.md": cppcode.fill(_README, PACKAGE=program.package, KIND=writer.kind),
         "leaves.hpp": writer.header(),
-        "main.cpp": cppcode.fill(_MAIN, PACKAGE=program.package, ROBOT_TREE=program.space),
+        "main.cpp": cppcode.fill(
+            _MAIN if tree.monitor is None else watched_main(_MAIN),
+            PACKAGE=program.package,
+            ROBOT_TREE=program.space,
+        ),
         "msg/Belief.msg": _BELIEF,
         "msg/Beliefs.msg": _BELIEFS,
     }
+    if tree.monitor is not None:
+        files["msg/Reading.msg"] = READING
+        files["msg/Beliefs.msg"] += FIRST_READINGS
+        files["README.md"] += README
     # To be adapted by their user: an export that comes later leaves them alone.
-    return {name: Begun(text) for name, text in (files | writer.interfaces()).items()}
+    begun: dict[str, str] = {name: Begun(text) for name, text in (files | writer.interfaces()).items()}
+    return (
+        begun
+        if tree.monitor is None
+        else begun | monitor_files(tree.task, names, tree.monitor, program.space)
+    )
 
 
 class _RosWriter:
-    def __init__(self, task: Task, names: BtcppNames, program: Program, services: bool) -> None:
-        self._task = task
+    def __init__(self, tree: Tree, names: BtcppNames, program: Program, services: bool) -> None:
+        self._task: Task = tree.task
+        self._monitor = tree.monitor
         self._names = names
         self._program = program
         self._services = services
         self.kind = "service" if services else "action"
         self._folder = "srv" if services else "action"
-        taken = {"belief", "beliefs"}
+        taken = {"belief", "beliefs"} | (set() if tree.monitor is None else {"reading"})
         self._types: dict[Symbol, str] = {}
         for leaf in names.interface.actions:
             # Names of interfaces have no underscores.
@@ -62,6 +86,7 @@ class _RosWriter:
                     *(f"string {field}" for field in cppcode.parameters(leaf.parameters)),
                     "---",
                     "bool success",
+                    *(["Reading[] readings"] if self._tells(leaf) else []),
                     *([] if self._services else ["---"]),
                     "",
                 ]
@@ -71,7 +96,8 @@ class _RosWriter:
 
     def cmake(self) -> str:
         """``CMakeLists.txt``."""
-        paths = [f'  "{name}"' for name in ["msg/Belief.msg", "msg/Beliefs.msg", *self.interfaces()]]
+        messages = ["msg/Belief.msg", "msg/Beliefs.msg"] + (["msg/Reading.msg"] if self._monitor else [])
+        paths = [f'  "{name}"' for name in [*messages, *self.interfaces()]]
         return cppcode.fill(_CMAKE, PACKAGE=self._program.package, INTERFACES="\n".join(paths))
 
     def header(self) -> str:
@@ -82,7 +108,7 @@ class _RosWriter:
         includes += [f'#include "{package}/{self._folder}/{name}.hpp"' for name in names]
         blocks = [
             cppcode.fill(
-                _HEAD,
+                _HEAD if self._monitor is None else watched_head(_HEAD),
                 INCLUDES="\n".join(includes),
                 CLIENT=f"<behaviortree_ros2/bt_{self.kind}_node.hpp>",
                 OURS='#include "bbtc_nodes.hpp"\n' if self._program.our_nodes else "",
@@ -113,14 +139,24 @@ class _RosWriter:
             for field, port in zip(cppcode.parameters(leaf.parameters), leaf.parameters, strict=True)
         ]
         kind = self._types[leaf.symbol]
+        text = _SERVICE if self._services else _ACTION
+        if self._monitor is not None:
+            text = watched(text, tells=self._tells(leaf))
+        key = key_code(self._names, leaf, [f"argument(*this, {cppcode.literal(p)})" for p in leaf.parameters])
         return cppcode.fill(
-            _SERVICE if self._services else _ACTION,
+            text,
+            KEY=key,
             TOLD=cppcode.comment(signature(leaf)),
             NAME=f"{self._names.plain[leaf.symbol]}Action",
             TYPE=f"{self._program.package}::{self._folder}::{kind}",
             PORTS=port_code(self._task, self._names, leaf),
             FIELDS="\n".join(fields) if fields else f"    (void)request;  // {self.kind} without arguments",
         )
+
+    def _tells(self, leaf: Leaf) -> bool:
+        """Does the monitor wait for what actions of this schema tell?"""
+        names = () if self._monitor is None else self._monitor.readings.keys() - {FIRST}
+        return any(action_symbol(self._task.action_by_name[name]) == leaf.symbol for name in names)
 
     def _register(self) -> str:
         lines = [
@@ -137,7 +173,8 @@ class _RosWriter:
         for leaf in self._names.interface.actions:
             server = cppcode.literal(_header_name(self._types[leaf.symbol]))
             lines.append(f"  params.default_port_value = {server};")
-            lines.append(self._registration(leaf.symbol, "Action", "params"))
+            given = "params" if self._monitor is None else "params, beliefs"
+            lines.append(self._registration(leaf.symbol, "Action", given))
         return "\n".join(
             [*lines, "  return beliefs;", "}", "", f"}}  // namespace {self._program.space}", ""]
         )

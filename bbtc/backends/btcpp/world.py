@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from typing_extensions import assert_never
 
 from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.leaves import LeafWriter
+from bbtc.backends.btcpp.monitor import MonitorTable, braces, key_code, key_of
 from bbtc.backends.btcpp.names import BtcppNames
 from bbtc.backends.interface import Leaf, action_symbol, variable_symbol
-from bbtc.backends.names import Symbol
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
 from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Factor, Outcome
 from bbtc.kleene import Truth
+from bbtc.tree.monitor import Monitor, Telling
 from bbtc.tree.nodes import Tree
 
 _VALUES = {Truth.TRUE: "Truth::True", Truth.FALSE: "Truth::False", Truth.UNKNOWN: "Truth::Unknown"}
@@ -40,6 +39,16 @@ class SimulatedRobot : public Robot {
 """
 
 
+_HIDDEN_CLASS = """\
+class SimulatedRobot : public Robot {
+ public:
+  SimulatedRobot(std::uint64_t seed, unsigned ticks, std::ostream* report)
+      : world_(model(), hidden(), monitor(), seed, ticks, report) {}
+
+  HiddenWorld& world() { return world_; }
+"""
+
+
 class SimulatedRobotWriter:
     """Writes ``simulated_robot.hpp``. Facts and actions are called as leaves and ports call them."""
 
@@ -54,23 +63,28 @@ class SimulatedRobotWriter:
 
     def header(self) -> str:
         """The text of the file."""
-        lines = [cppcode.fill(_HEAD, ROBOT_TREE=self._space) + self._model()]
-        lines += [_CLASS.rstrip(), *map(self._method, self._leaves.leaves())]
-        lines += ["", " private:", "  SimulatedWorld world_;", "};", ""]
+        head, kind, begun = _HEAD, "SimulatedWorld", _CLASS
+        if self._tree.monitor is not None:
+            head = head.replace('"simulated_world.hpp"', '"hidden_world.hpp"')
+            kind, begun = "HiddenWorld", _HIDDEN_CLASS
+        lines = [cppcode.fill(head, ROBOT_TREE=self._space) + self._model()]
+        lines += [] if self._tree.monitor is None else [self._hidden(self._tree.monitor)]
+        lines += [begun.rstrip(), *map(self._method, self._leaves.asked())]
+        lines += ["", " private:", f"  {kind} world_;", "};", ""]
         return "\n".join([*lines, f"}}  // namespace {self._space}", ""])
 
     # --- the model ---------------------------------------------------------------------------
 
     def _model(self) -> str:
         variables = [self._task.variables[index] for index in self._relevant]
-        facts = [cppcode.literal(self._name(variable_symbol(v), v.args)) for v in variables]
+        facts = [cppcode.literal(key_of(self._names, variable_symbol(v), v.args)) for v in variables]
         starts = initial_values(self._task, self._relevant)
         initial = [
-            _braces([f"{weight}u", _braces(_VALUES[value] for value in values)])
+            braces([f"{weight}u", braces(_VALUES[value] for value in values)])
             for weight, values in zip(cppcode.weights(starts.values()), starts, strict=True)
         ]
         actions = [
-            f"{{{cppcode.literal(self._name(action_symbol(action), action.args))},\n"
+            f"{{{cppcode.literal(key_of(self._names, action_symbol(action), action.args))},\n"
             f"           {self._factors(action.factors)}}}"
             for action in actions_used(self._tree)
         ]
@@ -87,15 +101,50 @@ class SimulatedRobotWriter:
             ]
         )
 
-    def _name(self, symbol: Symbol, args: Iterable[str]) -> str:
-        known = self._names.ids.get(symbol)
-        # A fact that no leaf reads still matters to effects.
-        name = known if known is not None else f"{symbol.name}/{symbol.arity}"
-        values = [self._names.values[arg] for arg in args]
-        return f"{name}({','.join(values)})"
+    def _hidden(self, monitor: Monitor) -> str:
+        """What is true at the start, and what actions tell."""
+        table = MonitorTable(self._task, self._names, monitor)
+        priors = []
+        for prior in monitor.priors:
+            weights = cppcode.weights(each.probability for each in prior)
+            draws = (
+                braces([f"{weight}u", braces(f"{{{self._number[at]}, {_VALUES[v]}}}" for at, v in each.sets)])
+                for weight, each in zip(weights, prior, strict=True)
+            )
+            priors.append(_rows(list(draws)))
+        by_action: dict[str, list[str]] = {}
+        for telling in monitor.tellings:
+            by_action.setdefault(telling.action, []).append(self._telling(telling))
+        tellings = [
+            f"{{{cppcode.literal(table.action(action))}, {_rows(each)}}}"
+            for action, each in by_action.items()
+        ]
+        return "\n".join(
+            [
+                "inline const HiddenModel& hidden() {",
+                "  static const HiddenModel all = {",
+                f"      /*priors=*/{_rows(priors)},",
+                f"      /*tellings=*/{_rows(tellings)}}};",
+                "  return all;",
+                "}",
+                "",
+            ]
+        )
+
+    def _telling(self, telling: Telling) -> str:
+        observation = telling.observation
+        right, wrong = cppcode.weights((observation.accuracy, 1 - observation.accuracy))
+        if observation.accuracy in (0, 1):
+            right, wrong = int(observation.accuracy), 1 - int(observation.accuracy)
+        when = "nullptr" if observation.when is None else self._lambda(observation.when)
+        items = [cppcode.literal(telling.name), f"{right}u", f"{wrong}u"]
+        return f"Telling{braces([*items, self._lambda(observation.condition), when])}"
+
+    def _lambda(self, condition: Condition) -> str:
+        return f"[](const State& s) {{ return {self._test(condition)}; }}"
 
     def _factors(self, factors: tuple[Factor, ...]) -> str:
-        return _braces(f"Factor{{{_braces(self._outcomes(factor))}}}" for factor in factors)
+        return braces(f"Factor{{{braces(self._outcomes(factor))}}}" for factor in factors)
 
     def _outcomes(self, factor: Factor) -> list[str]:
         weights = cppcode.weights(outcome.probability for outcome in factor.outcomes)
@@ -108,14 +157,11 @@ class SimulatedRobotWriter:
         effects = []
         for changes in changes_of(self._task, outcome):
             pairs = sorted(changes.sets.items())
-            sets = _braces(f"{{{self._number[index]}, {_VALUES[value]}}}" for index, value in pairs)
-            if changes.when == TRUE:
-                test = "nullptr"
-            else:
-                test = f"[](const State& s) {{ return {self._test(changes.when)}; }}"
+            sets = braces(f"{{{self._number[index]}, {_VALUES[value]}}}" for index, value in pairs)
+            test = "nullptr" if changes.when == TRUE else self._lambda(changes.when)
             if changes.sets:
                 effects.append(f"Effect{{{test}, {sets}}}")
-        return _braces(effects)
+        return braces(effects)
 
     def _test(self, condition: Condition) -> str:
         match condition:
@@ -130,9 +176,9 @@ class SimulatedRobotWriter:
             case Known(variable):
                 return f"is_known(s[{self._number[variable]}])"
             case And(parts):
-                return f"all_of({_braces(map(self._test, parts))})"
+                return f"all_of({braces(map(self._test, parts))})"
             case Or(parts):
-                return f"any_of({_braces(map(self._test, parts))})"
+                return f"any_of({braces(map(self._test, parts))})"
             case Not(part):
                 return f"negated({self._test(part)})"
             case _:
@@ -142,9 +188,7 @@ class SimulatedRobotWriter:
 
     def _method(self, leaf: Leaf) -> str:
         names = cppcode.parameters(leaf.parameters)
-        inner = ' + "," + '.join(names)
-        name = cppcode.literal(f"{self._names.ids[leaf.symbol]}({'' if names else ')'}")
-        key = f'std::string({name}) + {inner} + ")"' if names else name
+        key = key_code(self._names, leaf, list(names))
         declared = self._leaves.declaration(leaf, self._leaves.method(leaf))
         if leaf.symbol.kind == "predicate":
             value = f"world_.read({key})" if leaf.three_valued else f"world_.read({key}).value()"
@@ -154,10 +198,6 @@ class SimulatedRobotWriter:
             f"\n  {declared} override {{ return world_.act({key}); }}"
             f"\n  {cancel} override {{ world_.cancel({key}); }}"
         )
-
-
-def _braces(items: Iterable[str]) -> str:
-    return f"{{{', '.join(items)}}}"
 
 
 def _rows(items: list[str]) -> str:

@@ -22,6 +22,7 @@ from bbtc.backends.pytrees.parts import (
     fact_tuple,
     harmless,
     method,
+    words_tuple,
 )
 from bbtc.backends.pytrees.pycode import Code, Group, Prefixed, call, layout, literal, mapping
 from bbtc.backends.pytrees.runtime import RUNTIME, copied, defined, imports, needed, used_in
@@ -55,7 +56,7 @@ class PyTreesNames:
 
 def py_trees_names(tree: Tree) -> PyTreesNames:
     """The names used in the export of a tree."""
-    interface = interface_of(tree.task, tree.root)
+    interface = interface_of(tree)
     return PyTreesNames(interface, identifiers(interface.leaves, "snake", PYTHON_RESERVED))
 
 
@@ -83,6 +84,7 @@ class _Writer:
     def __init__(self, tree: Tree, *, embedded: bool) -> None:
         self.embedded = embedded
         self.task: Task = tree.task
+        self.monitor = tree.monitor
         self.claim = tree.success_probability
         self.root = fit(tree.root, "py_trees")
         self.names = py_trees_names(tree)
@@ -94,19 +96,22 @@ class _Writer:
 
     def module(self) -> str:
         """The source text."""
-        body = layout(call("StopWhenBlocked", "robot", self._code(self.root, 1), "READS"), "return ", level=1)
+        root_kind = "StopWhenBlocked" if self.monitor is None else "StopOutside"
+        body = layout(call(root_kind, "robot", self._code(self.root, 1), "READS"), "return ", level=1)
         root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *body]
-        trees, main = [*self.branches, root], _MAIN.splitlines()
+        trees, main = [*self.branches, root], (_MAIN if self.monitor is None else _MAIN_HIDDEN).splitlines()
         tables = [self._reads(), *self.world.tables()]
         # Without the methods of the robots, whose parameters may be named like anything.
-        used = {"Fact", "Protocol", "Status", "World", "run"}
+        used = {"Fact", "Protocol", "Status", "run"}
+        used |= {"World"} if self.monitor is None else {"HiddenWorld", "Monitor", "Part"}
         used |= used_in(line for block in [*trees, *tables, main] for line in block)
         if self.embedded:
             used = needed(used)
             nodes, world, head = copied("nodes", used), copied("world", used), imports(used)
+            world += copied("monitor", used)
         else:
             nodes, world, head = [], [], imports(used, ("bbtc.runtime", defined(used)))
-            head += ["", _PUBLIC]
+            head += ["", _PUBLIC if self.monitor is None else _PUBLIC_HIDDEN]
         lines = [*self._docstring(), "", *head]
         for block in [self._protocol(), *nodes, *trees, *world, *tables, self.world.world(), main]:
             lines += ["", "", *block]
@@ -127,8 +132,9 @@ class _Writer:
     # --- interface ---------------------------------------------------------------------------
 
     def _protocol(self) -> list[str]:
-        lines, methods = _PROTOCOL.splitlines(), self.names.methods
-        for leaf in self.names.interface.conditions:
+        methods = self.names.methods
+        lines = (_PROTOCOL if self.monitor is None else _PROTOCOL_HIDDEN).splitlines()
+        for leaf in self.names.interface.asked:
             lines += method(methods[leaf.symbol], leaf, CONDITION_TYPE, condition_summary(leaf))
         for leaf in self.names.interface.actions:
             lines += method(methods[leaf.symbol], leaf, "Status", action_summary(leaf))
@@ -175,7 +181,11 @@ class _Writer:
         action = self.task.action_by_name[node.action]
         method = f"robot.{self.names.methods[action_symbol(action)]}"
         name = literal(printable(node.name or node.action))
-        items: list[Code] = [name, _thunk(call(method, *map(literal, action.args))), "robot.cancel"]
+        act = _thunk(call(method, *map(literal, action.args)))
+        items: list[Code] = [name, act, "robot.cancel"]
+        if self.monitor is not None and node.action in self.monitor.readings:
+            told = words_tuple((action.schema, *action.args))
+            items = [name, Prefixed("*", call("watched", "robot", told, act))]
         guard = guard_of(self.task, node)
         if guard is not None:
             items.append(Prefixed("guard=", self._test(guard)))
@@ -188,6 +198,8 @@ class _Writer:
 
     def _read(self, variable: int) -> Code:
         read = self.task.variables[variable]
+        if self.monitor is not None and variable in self.monitor.known:
+            return call("robot.monitor.value", *map(literal, (read.predicate, *read.args)))
         return call(f"robot.{self.names.methods[variable_symbol(read)]}", *map(literal, read.args))
 
 
@@ -233,6 +245,8 @@ _REQUIRED = {
 
 _PUBLIC = '__all__ = ["Robot", "SimulatedWorld", "create_root", "run"]'
 
+_PUBLIC_HIDDEN = '__all__ = ["MONITOR", "Monitor", "Robot", "SimulatedWorld", "create_root", "run"]'
+
 _PROTOCOL = '''\
 class Robot(Protocol):
     """What the tree needs of a robot.
@@ -246,10 +260,44 @@ class Robot(Protocol):
         """The running action, named as in the tree, is no longer wanted."""
 '''
 
+_PROTOCOL_HIDDEN = '''\
+class Robot(Protocol):
+    """What the tree needs of a robot.
+
+    A condition answers at once: True, False, or None where it is unknown. An action is called in
+    every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
+    conditions show what it did. What is hidden the tree asks the monitor, Monitor(MONITOR, ...):
+    tell that, by monitor.told, what every action of MONITOR told, in the moment in which its
+    effects are seen.
+    """
+
+    monitor: Monitor
+
+    def cancel(self, action: str) -> None:
+        """The running action, named as in the tree, is no longer wanted."""
+'''
+
 _MAIN = '''\
 def main() -> None:
     """Run the tree in the simulated world."""
     simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+
+if __name__ == "__main__":
+    main()
+'''
+
+_MAIN_HIDDEN = '''\
+def main() -> None:
+    """Run the tree in the simulated world."""
+
+    def make(rng: random.Random, report: Callable[[str], None]) -> Behaviour:
+        world = SimulatedWorld(
+            INITIAL, ACTIONS, rng, report, priors=PRIORS, tellings=TELLINGS, parts=MONITOR
+        )
+        return create_root(world)
+
+    simulate(make)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from bbtc.backends.exporter import Begun, Figures, Option, OptionValue
-from bbtc.backends.interface import Interface, variable_symbol
+from bbtc.backends.interface import Interface, Leaf, action_symbol, variable_symbol
 from bbtc.backends.names import PYTHON_RESERVED, module_name
 from bbtc.backends.pytrees.exporter import PyTreesNames, py_trees_names
 from bbtc.backends.pytrees.parts import (
@@ -27,6 +27,7 @@ from bbtc.backends.pytrees.runtime import RUNTIME, copied, import_from, imports,
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
+from bbtc.tree.monitor import FIRST, Monitor
 from bbtc.tree.nodes import Tree
 
 MODULE = Option("module", "", "the module that --to py_trees wrote; by default named after the problem")
@@ -62,7 +63,7 @@ class PyTreesRobotExporter:
             )
         given = [word for word in str(options[NAMESPACE.name]).split("/") if word]
         embedded = options[RUNTIME.name] == "embedded"
-        lines = _lines(task, py_trees_names(tree), module, given or [task.domain, task.problem], embedded)
+        lines = _lines(tree, py_trees_names(tree), module, given or [task.domain, task.problem], embedded)
         return Begun("\n".join(lines) + "\n")
 
 
@@ -70,8 +71,9 @@ py_trees_robot = PyTreesRobotExporter()
 
 
 def _lines(
-    task: Task, names: PyTreesNames, module: str, namespace: list[str], embedded: bool
+    tree: Tree, names: PyTreesNames, module: str, namespace: list[str], embedded: bool
 ) -> Iterator[str]:
+    task = tree.task
     file = module.rpartition(".")[2]
     problem = harmless(task.problem)
     yield f'"""The robot of {file}.py for the problem {problem}. Begun by bbtc, to be filled in.'
@@ -83,38 +85,73 @@ def _lines(
     else:
         yield from imports(used, ("bbtc.runtime", ["Beliefs"]))
     yield ""
-    yield from import_from(module, ["Robot", "create_root", "run"])
+    watching = [] if tree.monitor is None else ["MONITOR", "Monitor"]
+    yield from import_from(module, [*watching, "Robot", "create_root", "run"])
     for block in copied("beliefs", used) if embedded else []:
         yield from ("", "", *block)
-    yield from ("", "", *_class(task, names, namespace))
+    yield from ("", "", *_class(tree, names, namespace))
     yield from ("", "", *_MAIN.splitlines())
 
 
-def _class(task: Task, names: PyTreesNames, namespace: list[str]) -> Iterator[str]:
+def _class(tree: Tree, names: PyTreesNames, namespace: list[str]) -> Iterator[str]:
     yield from _HEAD.splitlines()
     yield from layout(call("Beliefs", *map(literal, namespace)), "self._beliefs = ", level=2)
-    known = list(_believed_at_start(task, names.interface))
+    known = list(_believed_at_start(tree, names.interface))
     if known:
         yield "        # What the problem says of the start:"
     for value, fact in known:
         yield from layout(call("self._beliefs.believe", value, *map(literal, fact)), level=2)
+    if tree.monitor is not None:
+        yield "        self.monitor = Monitor(MONITOR, self._beliefs.value)"
+        if FIRST in tree.monitor.readings:
+            yield "        # Once it is known what the robot is told before its first action:"
+            yield from _telling("        ", (), tree.monitor.readings[FIRST])
     yield from _SETUP.splitlines()
-    for leaf in names.interface.conditions:
+    for leaf in names.interface.asked:
         reading = layout(call("self._beliefs.value", *fact_of(leaf)), "return ")
         name = names.methods[leaf.symbol]
         yield from method(name, leaf, CONDITION_TYPE, condition_summary(leaf), *reading)
     for leaf in names.interface.actions:
         failing = layout(call("self._to_do", *fact_of(leaf)), "return ")
-        yield from method(names.methods[leaf.symbol], leaf, "Status", action_summary(leaf), *failing)
+        told = [] if tree.monitor is None else list(_tellings(tree.task, tree.monitor, leaf))
+        yield from method(names.methods[leaf.symbol], leaf, "Status", action_summary(leaf), *told, *failing)
     yield from _TO_DO.splitlines()
 
 
-def _believed_at_start(task: Task, interface: Interface) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Facts that the tree may read, and what the problem says of them: the same in every initial state."""
+_MOST_TOLD = 8
+"""Actions of a schema whose readings are listed."""
+
+
+def _tellings(task: Task, monitor: Monitor, leaf: Leaf) -> Iterator[str]:
+    """What the actions of a schema tell, as comments in its method."""
+    actions = [
+        action
+        for action in map(task.action_by_name.__getitem__, sorted(monitor.readings.keys() - {FIRST}))
+        if action_symbol(action) == leaf.symbol
+    ]
+    if actions:
+        yield "# In the moment in which its effects are seen, though it fails or is cancelled:"
+    for action in actions[:_MOST_TOLD]:
+        yield from _telling("", (action.schema, *action.args), monitor.readings[action.name])
+    if len(actions) > _MOST_TOLD:
+        yield f"# and so on: {len(actions)} in all, see MONITOR"
+
+
+def _telling(indent: str, action: tuple[str, ...], readings: tuple[str, ...]) -> Iterator[str]:
+    listed = ", ".join(f"{literal(reading)}: True" for reading in readings)
+    items = [*map(literal, action), *([f"readings={{{listed}}}"] if readings else [])]
+    yield f"{indent}# self.monitor.told({', '.join(items)})"
+
+
+def _believed_at_start(tree: Tree, interface: Interface) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Facts that the tree may ask for, and what the problem says of them: the same in every initial state."""
+    task = tree.task
+    elsewhere = frozenset[int]() if tree.monitor is None else tree.monitor.known
     words = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
     for index, variable in enumerate(task.variables):
         values = {state.values[index] for state in task.initial}
-        if variable_symbol(variable) in interface.leaves and len(values) == 1:
+        asked = variable_symbol(variable) in interface.leaves and index not in elsewhere
+        if asked and len(values) == 1:
             yield words[values.pop()], (variable.predicate, *variable.args)
 
 

@@ -24,7 +24,7 @@ RUNTIME = Option(
     ("embedded", "imported"),
 )
 
-MODULES = ("nodes", "world", "beliefs")
+MODULES = ("nodes", "world", "beliefs", "monitor")
 """The modules of :mod:`bbtc.runtime`."""
 
 

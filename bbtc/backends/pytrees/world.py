@@ -8,6 +8,7 @@ from fractions import Fraction
 
 from bbtc.backends.interface import Interface
 from bbtc.backends.names import Symbol
+from bbtc.backends.pytrees.monitor import VALUES, MonitorWriter
 from bbtc.backends.pytrees.parts import (
     CONDITION_TYPE,
     ConditionCode,
@@ -22,8 +23,6 @@ from bbtc.ground.task import Factor, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree
 
-_VALUES = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
-
 
 class WorldWriter:
     """Writes the tables of facts and actions, and the class that plays the robot."""
@@ -36,7 +35,10 @@ class WorldWriter:
         self._methods = methods
         self._conditions = conditions
         self._actions = actions_used(tree)
-        self._relevant = relevant_variables(tree)
+        self._monitor = tree.monitor
+        # The monitor tells the one, and the priors the other.
+        elsewhere = frozenset() if tree.monitor is None else tree.monitor.known | tree.monitor.drawn
+        self._relevant = [index for index in relevant_variables(tree) if index not in elsewhere]
 
     def tables(self) -> list[list[str]]:
         """``INITIAL`` and ``ACTIONS``."""
@@ -45,18 +47,23 @@ class WorldWriter:
             (words_tuple((action.schema, *action.args)), self._factors(action.factors))
             for action in self._actions
         )
+        more = []
+        if self._monitor is not None:
+            more = MonitorWriter(self._task, self._monitor, self._conditions).tables()
         return [
             [*initial, '"""The states a run may start in, with their probabilities."""'],
             [
                 *layout(actions, "ACTIONS: dict[Fact, list[Factor]] = "),
                 '"""What each action does: independent choices between outcomes."""',
             ],
+            *more,
         ]
 
     def world(self) -> list[str]:
         """The class ``SimulatedWorld``."""
-        lines = ["class SimulatedWorld(World):", '    """Plays the robot."""']
-        for leaf in self._interface.conditions:
+        base = "World" if self._monitor is None else "HiddenWorld"
+        lines = [f"class SimulatedWorld({base}):", '    """Plays the robot."""']
+        for leaf in self._interface.asked:
             answer = flat(call("self._value", *fact_of(leaf)))
             lines += method(self._methods[leaf.symbol], leaf, CONDITION_TYPE, f"return {answer}")
         for leaf in self._interface.actions:
@@ -72,7 +79,7 @@ class WorldWriter:
         )
 
     def _state(self, assignment: Iterable[tuple[int, Truth]]) -> Code:
-        return mapping((self._fact(index), _VALUES[value]) for index, value in assignment)
+        return mapping((self._fact(index), VALUES[value]) for index, value in assignment)
 
     def _fact(self, index: int) -> str:
         return fact_tuple(self._task.variables[index])

@@ -7,6 +7,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -67,10 +68,12 @@ def command(
 ) -> int:
     """Watch TREE tick against the simulated world: on a terminal with keys, step by step; else
     every tick is printed until the run ends."""
+    from bbtc.belief.monitored import with_hidden
     from bbtc.belief.stepper import Stepper
     from bbtc.cli.inputs import tree_of
 
     loaded = tree_of(session.read(tree))
+    loaded = replace(loaded, task=with_hidden(loaded.task))  # to show what is true, too
     stepper = Stepper(loaded.task, loaded.root, seed, session.limits)
     taken = _Taken(outcomes)
     stepper.start(taken.next(stepper.starts) if len(stepper.starts) > 1 else None)
@@ -198,7 +201,7 @@ def _frame(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
         assert before.action is not None
         did = changes(tree, before.state.values, now.state.values)
         head = [f"tick {len(moments)}: {printable(before.action.action)}: {did}"]
-    lines = [*head, *_tree_lines(tree, stepper, full)]
+    lines = [*head, *_truth(stepper), *_tree_lines(tree, stepper, full)]
     if now.action is None:
         word = "blocked" if now.status.word == "running" else now.status.word
         return [*lines, f"end: {word}"]
@@ -207,6 +210,24 @@ def _frame(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
         did = changes(tree, now.state.values, branch.values)
         lines.append(f"  {number}. with probability {figure_text(branch.probability)}: {did}")
     return lines
+
+
+def _truth(stepper: Stepper) -> list[str]:
+    """What is true of what is hidden, if anything is."""
+    from bbtc.printable import printable
+
+    now = stepper.now
+    if not now.worlds:
+        return []
+    anew = ""
+    if len(stepper.moments) > 1:
+        before = stepper.moments[-2]
+        assert before.action is not None
+        action, values = before.action.action, before.state.values
+        if not stepper.truth.chance(action, values, before.worlds, now.state.values):
+            anew = " (drawn anew: what was chosen could not be told in what was true)"
+    facts = ", ".join(stepper.truth.facts(now.worlds)) or "nothing"
+    return [f"hidden, but true: {printable(facts)}{anew}"]
 
 
 def _tree_lines(tree: Tree, stepper: Stepper, full: bool) -> list[str]:

@@ -32,17 +32,15 @@ class Robot(Protocol):
 
     A condition answers at once: True, False, or None where it is unknown. An action is called in
     every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
-    conditions show what it did.
+    conditions show what it did. What is hidden the tree asks the monitor, Monitor(MONITOR, ...):
+    tell that, by monitor.told, what every action of MONITOR told, in the moment in which its
+    effects are seen.
     """
+
+    monitor: Monitor
 
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
-
-    def believed_faulty(self, arg1: str, arg2: str) -> bool | None:
-        """Whether believed-faulty(arg1, arg2) holds; None where that is unknown."""
-
-    def faulty(self, part: str) -> bool | None:
-        """Whether faulty(part) holds; None where that is unknown."""
 
     def measured(self, part: str) -> bool | None:
         """Whether measured(part) holds."""
@@ -70,6 +68,13 @@ def all_of(*values: bool | None) -> bool | None:
     if False in values:
         return False
     return None if None in values else True
+
+
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
 
 
 def negated(value: bool | None) -> bool | None:
@@ -318,7 +323,7 @@ def run(root: Behaviour, period: float = 0.0) -> Status:
 
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
-    return StopWhenBlocked(
+    return StopOutside(
         robot,
         fallback(
             "fallback",
@@ -326,34 +331,47 @@ def create_root(robot: Robot) -> Behaviour:
                 "skipper",
                 Condition(
                     "(not faulty(cable) and not faulty(motor))",
-                    lambda: all_of(negated(robot.faulty("cable")), negated(robot.faulty("motor"))),
+                    lambda: all_of(
+                        negated(robot.monitor.value("faulty", "cable")),
+                        negated(robot.monitor.value("faulty", "motor")),
+                    ),
                 ),
                 fallback(
                     "fallback",
                     sequence(
                         "sequence",
-                        Condition("known faulty(cable)", lambda: robot.faulty("cable") is not None),
-                        Latch("switch-on()", robot.switch_on, robot.cancel, keep=False),
+                        Condition(
+                            "known faulty(cable)",
+                            lambda: robot.monitor.value("faulty", "cable") is not None,
+                        ),
+                        Latch(
+                            "switch-on()",
+                            *watched(robot, ("switch-on",), robot.switch_on),
+                            keep=False,
+                        ),
                     ),
                     sequence(
                         "sequence",
                         Condition(
                             "known believed-faulty(cable,0.8)",
-                            lambda: robot.believed_faulty("cable", "0.8") is not None,
+                            lambda: robot.monitor.value("believed-faulty", "cable", "0.8") is not None,
                         ),
                         Condition(
                             "believed-faulty(cable,0.8)",
-                            lambda: robot.believed_faulty("cable", "0.8"),
+                            lambda: robot.monitor.value("believed-faulty", "cable", "0.8"),
                         ),
-                        Latch("swap(cable)", lambda: robot.swap("cable"), robot.cancel, keep=False),
+                        Latch(
+                            "swap(cable)",
+                            *watched(robot, ("swap", "cable"), lambda: robot.swap("cable")),
+                            keep=False,
+                        ),
                     ),
                     sequence(
                         "sequence",
                         Condition("not measured(cable)", lambda: negated(robot.measured("cable"))),
                         Latch(
                             "estimate(cable)",
-                            lambda: robot.estimate("cable"),
-                            robot.cancel,
+                            *watched(robot, ("estimate", "cable"), lambda: robot.estimate("cable")),
                             keep=False,
                         ),
                     ),
@@ -362,8 +380,7 @@ def create_root(robot: Robot) -> Behaviour:
                         Condition("not measured(motor)", lambda: negated(robot.measured("motor"))),
                         Latch(
                             "estimate(motor)",
-                            lambda: robot.estimate("motor"),
-                            robot.cancel,
+                            *watched(robot, ("estimate", "motor"), lambda: robot.estimate("motor")),
                             keep=False,
                         ),
                     ),
@@ -371,24 +388,50 @@ def create_root(robot: Robot) -> Behaviour:
                         "sequence",
                         Condition(
                             "unknown believed-faulty(cable,0.8)",
-                            lambda: robot.believed_faulty("cable", "0.8") is None,
+                            lambda: robot.monitor.value("believed-faulty", "cable", "0.8") is None,
                         ),
-                        Latch("swap(cable)", lambda: robot.swap("cable"), robot.cancel, keep=False),
+                        Latch(
+                            "swap(cable)",
+                            *watched(robot, ("swap", "cable"), lambda: robot.swap("cable")),
+                            keep=False,
+                        ),
                     ),
                     sequence(
                         "sequence",
-                        Condition("unknown faulty(motor)", lambda: robot.faulty("motor") is None),
-                        Latch("swap(motor)", lambda: robot.swap("motor"), robot.cancel, keep=False),
+                        Condition(
+                            "unknown faulty(motor)",
+                            lambda: robot.monitor.value("faulty", "motor") is None,
+                        ),
+                        Latch(
+                            "swap(motor)",
+                            *watched(robot, ("swap", "motor"), lambda: robot.swap("motor")),
+                            keep=False,
+                        ),
                     ),
-                    Latch("switch-on()", robot.switch_on, robot.cancel, keep=False),
+                    Latch(
+                        "switch-on()",
+                        *watched(robot, ("switch-on",), robot.switch_on),
+                        keep=False,
+                    ),
                 ),
             ),
             sequence(
                 "sequence",
-                Condition("not faulty(cable)", lambda: negated(robot.faulty("cable"))),
-                Latch("swap(motor)", lambda: robot.swap("motor"), robot.cancel, keep=False),
+                Condition(
+                    "not faulty(cable)",
+                    lambda: negated(robot.monitor.value("faulty", "cable")),
+                ),
+                Latch(
+                    "swap(motor)",
+                    *watched(robot, ("swap", "motor"), lambda: robot.swap("motor")),
+                    keep=False,
+                ),
             ),
-            Latch("swap(cable)", lambda: robot.swap("cable"), robot.cancel, keep=False),
+            Latch(
+                "swap(cable)",
+                *watched(robot, ("swap", "cable"), lambda: robot.swap("cable")),
+                keep=False,
+            ),
         ),
         READS,
     )
@@ -496,377 +539,340 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
         print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
 
 
-READS: dict[Fact, bool] = {
-    ("believed-faulty", "cable", "0.8"): True,
-    ("faulty", "cable"): True,
-    ("faulty", "motor"): True,
-    ("measured", "cable"): False,
-    ("measured", "motor"): False,
-}
+Entry = int | bool | None
+Rows = dict[tuple[Entry, ...], int]
+
+
+class Move:
+    """What an action may tell. ``rows`` lead from what was believed, the ``seen`` facts before the
+    action, the ``readings`` (None: not made), and the seen facts after it, to what is believed
+    then."""
+
+    def __init__(self, seen: list[Fact], readings: list[str], rows: Rows) -> None:
+        self.seen = seen
+        self.readings = readings
+        self.rows = rows
+
+
+class Part:
+    """Facts that depend on each other: what is known of them (None: it is unknown) in each belief,
+    by number, the belief to begin with, and what each action may tell of them."""
+
+    def __init__(
+        self,
+        facts: list[Fact],
+        values: list[tuple[bool | None, ...]],
+        start: int,
+        moves: dict[Fact, Move],
+    ) -> None:
+        self.facts = facts
+        self.values = values
+        self.start = start
+        self.moves = moves
+
+
+class Monitor:
+    """Knows of hidden facts what follows from all that the robot was told. ``see`` tells what the
+    robot sees of a fact that is not hidden.
+
+    Call :meth:`told` for every action that tells anything, in the moment in which its effects are
+    seen. What cannot be in the model ends that: :attr:`outside` says what it was, and nothing is
+    known from then on.
+    """
+
+    def __init__(self, parts: list[Part], see: Callable[..., bool | None]) -> None:
+        self.outside = ""
+        self._parts = parts
+        self._see = see
+        self._beliefs = [part.start for part in parts]
+        self._place: dict[Fact, tuple[int, int]] = {}
+        for number, part in enumerate(parts):
+            self._place.update((fact, (number, at)) for at, fact in enumerate(part.facts))
+        self._before: dict[Fact, list[tuple[bool | None, ...]]] = {}
+        self._waits = self.listens()
+
+    def listens(self, *action: str) -> bool:
+        """Does the action tell anything? Without an action: is anything told before the first?"""
+        return any(action in part.moves for part in self._parts)
+
+    def waits(self) -> bool:
+        """Is what the robot is told before its first action still missing?"""
+        return self._waits
+
+    def value(self, *fact: str) -> bool | None:
+        """What is known of a hidden fact: None if it is unknown."""
+        if self.outside:
+            return None
+        number, at = self._place[fact]
+        return self._parts[number].values[self._beliefs[number]][at]
+
+    def known(self) -> State:
+        """What is known of every fact."""
+        return {fact: self.value(*fact) for fact in self._place}
+
+    def begin(self, *action: str) -> None:
+        """The action starts. The tree calls this."""
+        if not self.listens(*action):
+            return
+        for earlier in self._before:
+            self._leave(f"{in_words(earlier)} told nothing")
+        moves = [part.moves.get(action) for part in self._parts]
+        self._before[action] = [
+            tuple(self._see(*fact) for fact in move.seen) if move else () for move in moves
+        ]
+
+    def told(self, *action: str, readings: Mapping[str, bool | None] | None = None) -> None:
+        """What the action told: of each observation that was made, by name, whether it seemed true.
+        Seen facts are read now, but for those that stand here, too, by name. Without an action:
+        what the robot was told before its first one."""
+        if not self.listens(*action):
+            return
+        told = dict(readings or {})
+        name = in_words(action) if action else "what is told at the start"
+        before = self._before.pop(action, None)
+        if before is None and not (self._waits and not action):
+            self._leave(f"{name}: it was not started")
+            return
+        self._waits = self._waits and action != ()
+        used: set[str] = set()
+        for number, part in enumerate(self._parts):
+            move = part.moves.get(action)
+            if move is None:
+                continue
+            after = [told[in_words(f)] if in_words(f) in told else self._see(*f) for f in move.seen]
+            used.update(move.readings, map(in_words, move.seen))
+            read = [told.get(reading) for reading in move.readings]
+            # Before the first action nothing has changed.
+            seen = tuple(after) if before is None else before[number]
+            row = move.rows.get((self._beliefs[number], *seen, *read, *after))
+            if row is None:
+                names = [*move.readings, *map(in_words, move.seen)]
+                what = [f"{n} {v}" for n, v in zip(names, [*read, *after], strict=True)]
+                self._leave(f"{name}: {', '.join(what) or 'at this point'}")
+            else:
+                self._beliefs[number] = row
+        for reading in told.keys() - used:
+            self._leave(f"{name}: it has no reading {reading}")
+
+    def _leave(self, why: str) -> None:
+        self.outside = self.outside or f"outside the model: {why}"
+
+
+class WithMonitor(Protocol):
+    """A robot with a monitor."""
+
+    monitor: Monitor
+
+    def cancel(self, action: str) -> None:
+        """The running action is no longer wanted."""
+
+
+def watched(
+    robot: WithMonitor, action: Fact, act: Callable[[], Status]
+) -> tuple[Callable[[], Status], Callable[[str], None]]:
+    """The calls that run and cancel an action, so that the monitor learns when it starts."""
+    running = False
+
+    def go_on() -> Status:
+        nonlocal running
+        if not running:
+            robot.monitor.begin(*action)
+        running = True
+        status = act()
+        running = status == Status.RUNNING
+        return status
+
+    def cancel(name: str) -> None:
+        nonlocal running
+        running = False
+        robot.cancel(name)
+
+    return go_on, cancel
+
+
+class StopOutside(StopWhenBlocked):
+    """The root of a tree of a robot with a monitor: FAILURE, too, where what happened is outside
+    the model. Before its first tick the tree waits for what the robot is told before its first
+    action."""
+
+    def __init__(
+        self, robot: WithMonitor, child: Behaviour, reads: Mapping[Fact, bool] | None = None
+    ) -> None:
+        super().__init__(robot, child, reads)
+        self._watching = robot
+
+    def tick(self) -> Iterator[Behaviour]:
+        monitor = self._watching.monitor
+        if not monitor.outside and not monitor.waits():
+            yield from super().tick()
+            return
+        if monitor.outside:
+            self.feedback_message = monitor.outside
+            self.stop(Status.FAILURE)
+        else:
+            self.feedback_message = "waiting for what is told at the start"
+            self.status = Status.RUNNING
+        yield self
+
+
+class Telling:
+    """An observation of a simulated action: its name, how probably it is right, what it tells of,
+    and when it is made (None: always)."""
+
+    def __init__(
+        self,
+        name: str,
+        accuracy: str,
+        tells: Callable[[State], bool | None],
+        when: Callable[[State], bool | None] | None = None,
+    ) -> None:
+        self.name = name
+        self.accuracy = accuracy
+        self.tells = tells
+        self.when = when
+
+
+class HiddenWorld(World):
+    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``,
+    and the robot is told no more than ``tellings`` say."""
+
+    def __init__(
+        self,
+        initial: list[tuple[str, State]],
+        actions: dict[Fact, list[Factor]],
+        rng: random.Random,
+        report: Callable[[str], None],
+        *,
+        priors: list[list[tuple[str, State]]],
+        tellings: dict[Fact, list[Telling]],
+        parts: list[Part],
+    ) -> None:
+        super().__init__(initial, actions, rng, report)
+        for prior in priors:
+            drawn: State = draw(rng, prior)
+            self._state.update(drawn)
+        self._tellings = tellings
+        self.monitor = Monitor(parts, self._value)
+        truth = [in_words(fact) for prior in priors for fact in prior[0][1] if self._state[fact]]
+        report(f"the truth: {', '.join(truth) or 'nothing'}")
+        self._listen()
+
+    def _act(self, *action: str) -> Status:
+        status = super()._act(*action)
+        self._listen(*action)
+        return status
+
+    def _listen(self, *action: str) -> None:
+        if self.monitor.listens(*action):
+            readings = {
+                telling.name: self._reading(telling)
+                for telling in self._tellings.get(action, [])
+                if telling.when is None or telling.when(self._state)
+            }
+            self.monitor.told(*action, readings=readings)
+            told = [f"{name} {'true' if value else 'false'}" for name, value in readings.items()]
+            self._report(f"  told: {', '.join(told) or 'nothing'}; known: {self._words()}")
+        self._state.update(self.monitor.known())
+
+    def _reading(self, telling: Telling) -> bool:
+        false = str(1 - Fraction(telling.accuracy))
+        right = draw(self._rng, [(telling.accuracy, True), (false, False)])
+        return bool(telling.tells(self._state)) == right
+
+    def _words(self) -> str:
+        known = [each for each in self.monitor.known().items() if each[1] is not None]
+        words = [f"{'' if value else 'not '}{in_words(fact)}" for fact, value in known]
+        return self.monitor.outside or ", ".join(words) or "nothing"
+
+
+READS: dict[Fact, bool] = {("measured", "cable"): False, ("measured", "motor"): False}
 """The facts that the tree reads, and whether they can be unknown."""
 
 
 INITIAL: list[tuple[str, State]] = [
-    (
-        "1",
-        {
-            ("believed-faulty", "cable", "0.8"): None,
-            ("faulty", "cable"): None,
-            ("faulty", "motor"): None,
-            ("measured", "cable"): False,
-            ("measured", "motor"): False,
-            ("belief", "1", "1"): False,
-            ("belief", "1", "2"): False,
-            ("belief", "1", "3"): False,
-            ("belief", "1", "4"): False,
-        },
-    ),
+    ("1", {("measured", "cable"): False, ("measured", "motor"): False}),
 ]
 """The states a run may start in, with their probabilities."""
 
 
 ACTIONS: dict[Fact, list[Factor]] = {
-    ("estimate", "cable"): [
-        [Outcome("1", {("measured", "cable"): True})],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                        negated(s[("belief", "1", "3")]),
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): True,
-                        ("faulty", "cable"): None,
-                        ("faulty", "motor"): None,
-                        ("belief", "1", "1"): False,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): False,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                        negated(s[("belief", "1", "3")]),
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): None,
-                        ("faulty", "motor"): None,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): False,
-                        ("belief", "1", "3"): False,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-        ],
-    ],
-    ("estimate", "motor"): [
-        [Outcome("1", {("measured", "motor"): True})],
-        [
-            Outcome(
-                "51/200",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("belief", "1", "1")],
-                        negated(s[("belief", "1", "2")]),
-                        negated(s[("belief", "1", "3")]),
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): None,
-                        ("faulty", "cable"): None,
-                        ("faulty", "motor"): None,
-                        ("belief", "1", "1"): False,
-                        ("belief", "1", "2"): False,
-                        ("belief", "1", "3"): False,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "149/200",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("belief", "1", "1")],
-                        negated(s[("belief", "1", "2")]),
-                        negated(s[("belief", "1", "3")]),
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): None,
-                        ("faulty", "motor"): None,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): False,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-        ],
-    ],
-    ("swap", "cable"): [
-        [
-            Outcome(
-                "1",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        s[("belief", "1", "2")],
-                        negated(s[("belief", "1", "3")]),
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): None,
-                        ("belief", "1", "1"): False,
-                        ("belief", "1", "2"): False,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                        negated(s[("belief", "1", "3")]),
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): None,
-                        ("belief", "1", "1"): False,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-                When(
-                    lambda s: all_of(
-                        s[("belief", "1", "1")],
-                        negated(s[("belief", "1", "2")]),
-                        negated(s[("belief", "1", "3")]),
-                        s[("belief", "1", "4")],
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-        ],
-    ],
-    ("swap", "motor"): [
-        [
-            Outcome(
-                "1",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("belief", "1", "1")],
-                        s[("belief", "1", "2")],
-                        negated(s[("belief", "1", "3")]),
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): None,
-                        ("faulty", "motor"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): False,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                        negated(s[("belief", "1", "3")]),
-                        s[("belief", "1", "4")],
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-        ],
-    ],
-    ("switch-on",): [
-        [
-            Outcome(
-                "17/20",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                        s[("belief", "1", "3")],
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "3/20",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                        s[("belief", "1", "3")],
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): True,
-                        ("belief", "1", "1"): False,
-                        ("belief", "1", "2"): False,
-                        ("belief", "1", "3"): False,
-                        ("belief", "1", "4"): True,
-                    },
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "289/298",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("belief", "1", "1")],
-                        negated(s[("belief", "1", "2")]),
-                        s[("belief", "1", "3")],
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "9/298",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("belief", "1", "1")],
-                        negated(s[("belief", "1", "2")]),
-                        s[("belief", "1", "3")],
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): True,
-                        ("faulty", "cable"): True,
-                        ("faulty", "motor"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): False,
-                        ("belief", "1", "3"): False,
-                        ("belief", "1", "4"): True,
-                    },
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        s[("belief", "1", "2")],
-                        s[("belief", "1", "3")],
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): True,
-                        ("belief", "1", "3"): True,
-                        ("belief", "1", "4"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        s[("belief", "1", "2")],
-                        s[("belief", "1", "3")],
-                        negated(s[("belief", "1", "4")]),
-                    ),
-                    {
-                        ("believed-faulty", "cable", "0.8"): False,
-                        ("faulty", "cable"): False,
-                        ("faulty", "motor"): True,
-                        ("belief", "1", "1"): False,
-                        ("belief", "1", "2"): False,
-                        ("belief", "1", "3"): False,
-                        ("belief", "1", "4"): True,
-                    },
-                ),
-            ),
-        ],
-    ],
+    ("estimate", "cable"): [[Outcome("1", {("measured", "cable"): True})]],
+    ("estimate", "motor"): [[Outcome("1", {("measured", "motor"): True})]],
+    ("swap", "cable"): [[Outcome("1", {("really faulty", "cable"): False})]],
+    ("swap", "motor"): [[Outcome("1", {("really faulty", "motor"): False})]],
+    ("switch-on",): [[Outcome("1", {})]],
 }
 """What each action does: independent choices between outcomes."""
 
 
-class SimulatedWorld(World):
+MONITOR: list[Part] = [
+    Part(
+        [("believed-faulty", "cable", "0.8"), ("faulty", "cable"), ("faulty", "motor")],
+        [
+            (None, None, None),
+            (False, None, None),
+            (True, None, None),
+            (False, None, None),
+            (False, False, None),
+            (False, None, False),
+            (False, False, None),
+            (False, False, False),
+            (False, False, True),
+            (True, True, False),
+        ],
+        0,
+        {
+            ("estimate", "cable"): Move([], ["faulty(cable)"], {(0, True): 2, (0, False): 1}),
+            ("estimate", "motor"): Move([], ["faulty(motor)"], {(1, False): 0, (1, True): 3}),
+            ("swap", "cable"): Move([], [], {(2,): 4, (0,): 6, (9,): 7}),
+            ("swap", "motor"): Move([], [], {(3,): 5, (8,): 7}),
+            ("switch-on",): Move(
+                [],
+                ["(faulty(cable) or faulty(motor))"],
+                {
+                    (4, False): 7,
+                    (4, True): 8,
+                    (5, False): 7,
+                    (5, True): 9,
+                    (6, False): 7,
+                    (6, True): 8,
+                },
+            ),
+        },
+    ),
+]
+"""What is known, by what the robot was told. It has what the runs of the tree reach."""
+
+
+PRIORS: list[list[tuple[str, State]]] = [
+    [
+        ("1/2", {("really faulty", "cable"): True, ("really faulty", "motor"): False}),
+        ("1/2", {("really faulty", "cable"): False, ("really faulty", "motor"): True}),
+    ],
+]
+"""What may be true at the start, with probabilities: independent choices."""
+
+
+TELLINGS: dict[Fact, list[Telling]] = {
+    ("estimate", "cable"): [
+        Telling("faulty(cable)", "17/20", lambda s: s[("really faulty", "cable")]),
+    ],
+    ("estimate", "motor"): [
+        Telling("faulty(motor)", "17/20", lambda s: s[("really faulty", "motor")]),
+    ],
+    ("switch-on",): [
+        Telling(
+            "(faulty(cable) or faulty(motor))",
+            "1",
+            lambda s: any_of(s[("really faulty", "cable")], s[("really faulty", "motor")]),
+        ),
+    ],
+}
+"""What each action tells."""
+
+
+class SimulatedWorld(HiddenWorld):
     """Plays the robot."""
-
-    def believed_faulty(self, arg1: str, arg2: str) -> bool | None:
-        return self._value("believed-faulty", arg1, arg2)
-
-    def faulty(self, part: str) -> bool | None:
-        return self._value("faulty", part)
 
     def measured(self, part: str) -> bool | None:
         return self._value("measured", part)
@@ -883,7 +889,14 @@ class SimulatedWorld(World):
 
 def main() -> None:
     """Run the tree in the simulated world."""
-    simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+    def make(rng: random.Random, report: Callable[[str], None]) -> Behaviour:
+        world = SimulatedWorld(
+            INITIAL, ACTIONS, rng, report, priors=PRIORS, tellings=TELLINGS, parts=MONITOR
+        )
+        return create_root(world)
+
+    simulate(make)
 
 
 if __name__ == "__main__":

@@ -32,20 +32,18 @@ class Robot(Protocol):
 
     A condition answers at once: True, False, or None where it is unknown. An action is called in
     every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
-    conditions show what it did.
+    conditions show what it did. What is hidden the tree asks the monitor, Monitor(MONITOR, ...):
+    tell that, by monitor.told, what every action of MONITOR told, in the moment in which its
+    effects are seen.
     """
+
+    monitor: Monitor
 
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
     def pressed(self, part: str) -> bool | None:
         """Whether pressed(part) holds."""
-
-    def spoilt(self, part: str) -> bool | None:
-        """Whether spoilt(part) holds; None where that is unknown."""
-
-    def upside_down(self, part: str) -> bool | None:
-        """Whether upside-down(part) holds; None where that is unknown."""
 
     def look(self, part: str) -> Status:
         """Start or continue look(part)."""
@@ -63,13 +61,6 @@ Fact = tuple[str, ...]
 def in_words(fact: Fact) -> str:
     """``predicate(object,…)``."""
     return f"{fact[0]}({','.join(fact[1:])})"
-
-
-def all_of(*values: bool | None) -> bool | None:
-    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
-    if False in values:
-        return False
-    return None if None in values else True
 
 
 def negated(value: bool | None) -> bool | None:
@@ -293,29 +284,38 @@ def run(root: Behaviour, period: float = 0.0) -> Status:
 
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
-    return StopWhenBlocked(
+    return StopOutside(
         robot,
         fallback(
             "fallback",
             sequence(
                 "sequence",
                 Condition("pressed(lid)", lambda: robot.pressed("lid")),
-                Condition("not spoilt(lid)", lambda: negated(robot.spoilt("lid"))),
+                Condition("not spoilt(lid)", lambda: negated(robot.monitor.value("spoilt", "lid"))),
                 Condition("pressed(base)", lambda: robot.pressed("base")),
-                Condition("not spoilt(base)", lambda: negated(robot.spoilt("base"))),
+                Condition(
+                    "not spoilt(base)",
+                    lambda: negated(robot.monitor.value("spoilt", "base")),
+                ),
             ),
             sequence(
                 "sequence",
-                Condition("unknown upside-down(base)", lambda: robot.upside_down("base") is None),
-                Latch("look(base)", lambda: robot.look("base"), robot.cancel, keep=False),
+                Condition(
+                    "unknown upside-down(base)",
+                    lambda: robot.monitor.value("upside-down", "base") is None,
+                ),
+                Latch(
+                    "look(base)",
+                    *watched(robot, ("look", "base"), lambda: robot.look("base")),
+                    keep=False,
+                ),
             ),
             sequence(
                 "sequence",
-                Condition("upside-down(base)", lambda: robot.upside_down("base")),
+                Condition("upside-down(base)", lambda: robot.monitor.value("upside-down", "base")),
                 Latch(
                     "turn(base)",
-                    lambda: robot.turn("base"),
-                    robot.cancel,
+                    *watched(robot, ("turn", "base"), lambda: robot.turn("base")),
                     guard=lambda: negated(robot.pressed("base")),
                     keep=False,
                 ),
@@ -323,28 +323,40 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "for pressed(base)",
                 Condition("not pressed(base)", lambda: negated(robot.pressed("base"))),
-                Latch("press(base)", lambda: robot.press("base"), robot.cancel, keep=False),
+                Latch(
+                    "press(base)",
+                    *watched(robot, ("press", "base"), lambda: robot.press("base")),
+                    keep=False,
+                ),
             ),
             sequence(
                 "sequence",
-                Condition("unknown upside-down(lid)", lambda: robot.upside_down("lid") is None),
-                Latch("look(lid)", lambda: robot.look("lid"), robot.cancel, keep=False),
+                Condition(
+                    "unknown upside-down(lid)",
+                    lambda: robot.monitor.value("upside-down", "lid") is None,
+                ),
+                Latch(
+                    "look(lid)",
+                    *watched(robot, ("look", "lid"), lambda: robot.look("lid")),
+                    keep=False,
+                ),
             ),
             sequence(
                 "for pressed(lid)",
-                Condition("not upside-down(lid)", lambda: negated(robot.upside_down("lid"))),
+                Condition(
+                    "not upside-down(lid)",
+                    lambda: negated(robot.monitor.value("upside-down", "lid")),
+                ),
                 Latch(
                     "press(lid)",
-                    lambda: robot.press("lid"),
-                    robot.cancel,
+                    *watched(robot, ("press", "lid"), lambda: robot.press("lid")),
                     guard=lambda: negated(robot.pressed("lid")),
                     keep=False,
                 ),
             ),
             Latch(
                 "turn(lid)",
-                lambda: robot.turn("lid"),
-                robot.cancel,
+                *watched(robot, ("turn", "lid"), lambda: robot.turn("lid")),
                 guard=lambda: negated(robot.pressed("lid")),
                 keep=False,
             ),
@@ -455,102 +467,272 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
         print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
 
 
-READS: dict[Fact, bool] = {
-    ("pressed", "base"): False,
-    ("pressed", "lid"): False,
-    ("spoilt", "base"): True,
-    ("spoilt", "lid"): True,
-    ("upside-down", "base"): True,
-    ("upside-down", "lid"): True,
-}
+Entry = int | bool | None
+Rows = dict[tuple[Entry, ...], int]
+
+
+class Move:
+    """What an action may tell. ``rows`` lead from what was believed, the ``seen`` facts before the
+    action, the ``readings`` (None: not made), and the seen facts after it, to what is believed
+    then."""
+
+    def __init__(self, seen: list[Fact], readings: list[str], rows: Rows) -> None:
+        self.seen = seen
+        self.readings = readings
+        self.rows = rows
+
+
+class Part:
+    """Facts that depend on each other: what is known of them (None: it is unknown) in each belief,
+    by number, the belief to begin with, and what each action may tell of them."""
+
+    def __init__(
+        self,
+        facts: list[Fact],
+        values: list[tuple[bool | None, ...]],
+        start: int,
+        moves: dict[Fact, Move],
+    ) -> None:
+        self.facts = facts
+        self.values = values
+        self.start = start
+        self.moves = moves
+
+
+class Monitor:
+    """Knows of hidden facts what follows from all that the robot was told. ``see`` tells what the
+    robot sees of a fact that is not hidden.
+
+    Call :meth:`told` for every action that tells anything, in the moment in which its effects are
+    seen. What cannot be in the model ends that: :attr:`outside` says what it was, and nothing is
+    known from then on.
+    """
+
+    def __init__(self, parts: list[Part], see: Callable[..., bool | None]) -> None:
+        self.outside = ""
+        self._parts = parts
+        self._see = see
+        self._beliefs = [part.start for part in parts]
+        self._place: dict[Fact, tuple[int, int]] = {}
+        for number, part in enumerate(parts):
+            self._place.update((fact, (number, at)) for at, fact in enumerate(part.facts))
+        self._before: dict[Fact, list[tuple[bool | None, ...]]] = {}
+        self._waits = self.listens()
+
+    def listens(self, *action: str) -> bool:
+        """Does the action tell anything? Without an action: is anything told before the first?"""
+        return any(action in part.moves for part in self._parts)
+
+    def waits(self) -> bool:
+        """Is what the robot is told before its first action still missing?"""
+        return self._waits
+
+    def value(self, *fact: str) -> bool | None:
+        """What is known of a hidden fact: None if it is unknown."""
+        if self.outside:
+            return None
+        number, at = self._place[fact]
+        return self._parts[number].values[self._beliefs[number]][at]
+
+    def known(self) -> State:
+        """What is known of every fact."""
+        return {fact: self.value(*fact) for fact in self._place}
+
+    def begin(self, *action: str) -> None:
+        """The action starts. The tree calls this."""
+        if not self.listens(*action):
+            return
+        for earlier in self._before:
+            self._leave(f"{in_words(earlier)} told nothing")
+        moves = [part.moves.get(action) for part in self._parts]
+        self._before[action] = [
+            tuple(self._see(*fact) for fact in move.seen) if move else () for move in moves
+        ]
+
+    def told(self, *action: str, readings: Mapping[str, bool | None] | None = None) -> None:
+        """What the action told: of each observation that was made, by name, whether it seemed true.
+        Seen facts are read now, but for those that stand here, too, by name. Without an action:
+        what the robot was told before its first one."""
+        if not self.listens(*action):
+            return
+        told = dict(readings or {})
+        name = in_words(action) if action else "what is told at the start"
+        before = self._before.pop(action, None)
+        if before is None and not (self._waits and not action):
+            self._leave(f"{name}: it was not started")
+            return
+        self._waits = self._waits and action != ()
+        used: set[str] = set()
+        for number, part in enumerate(self._parts):
+            move = part.moves.get(action)
+            if move is None:
+                continue
+            after = [told[in_words(f)] if in_words(f) in told else self._see(*f) for f in move.seen]
+            used.update(move.readings, map(in_words, move.seen))
+            read = [told.get(reading) for reading in move.readings]
+            # Before the first action nothing has changed.
+            seen = tuple(after) if before is None else before[number]
+            row = move.rows.get((self._beliefs[number], *seen, *read, *after))
+            if row is None:
+                names = [*move.readings, *map(in_words, move.seen)]
+                what = [f"{n} {v}" for n, v in zip(names, [*read, *after], strict=True)]
+                self._leave(f"{name}: {', '.join(what) or 'at this point'}")
+            else:
+                self._beliefs[number] = row
+        for reading in told.keys() - used:
+            self._leave(f"{name}: it has no reading {reading}")
+
+    def _leave(self, why: str) -> None:
+        self.outside = self.outside or f"outside the model: {why}"
+
+
+class WithMonitor(Protocol):
+    """A robot with a monitor."""
+
+    monitor: Monitor
+
+    def cancel(self, action: str) -> None:
+        """The running action is no longer wanted."""
+
+
+def watched(
+    robot: WithMonitor, action: Fact, act: Callable[[], Status]
+) -> tuple[Callable[[], Status], Callable[[str], None]]:
+    """The calls that run and cancel an action, so that the monitor learns when it starts."""
+    running = False
+
+    def go_on() -> Status:
+        nonlocal running
+        if not running:
+            robot.monitor.begin(*action)
+        running = True
+        status = act()
+        running = status == Status.RUNNING
+        return status
+
+    def cancel(name: str) -> None:
+        nonlocal running
+        running = False
+        robot.cancel(name)
+
+    return go_on, cancel
+
+
+class StopOutside(StopWhenBlocked):
+    """The root of a tree of a robot with a monitor: FAILURE, too, where what happened is outside
+    the model. Before its first tick the tree waits for what the robot is told before its first
+    action."""
+
+    def __init__(
+        self, robot: WithMonitor, child: Behaviour, reads: Mapping[Fact, bool] | None = None
+    ) -> None:
+        super().__init__(robot, child, reads)
+        self._watching = robot
+
+    def tick(self) -> Iterator[Behaviour]:
+        monitor = self._watching.monitor
+        if not monitor.outside and not monitor.waits():
+            yield from super().tick()
+            return
+        if monitor.outside:
+            self.feedback_message = monitor.outside
+            self.stop(Status.FAILURE)
+        else:
+            self.feedback_message = "waiting for what is told at the start"
+            self.status = Status.RUNNING
+        yield self
+
+
+class Telling:
+    """An observation of a simulated action: its name, how probably it is right, what it tells of,
+    and when it is made (None: always)."""
+
+    def __init__(
+        self,
+        name: str,
+        accuracy: str,
+        tells: Callable[[State], bool | None],
+        when: Callable[[State], bool | None] | None = None,
+    ) -> None:
+        self.name = name
+        self.accuracy = accuracy
+        self.tells = tells
+        self.when = when
+
+
+class HiddenWorld(World):
+    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``,
+    and the robot is told no more than ``tellings`` say."""
+
+    def __init__(
+        self,
+        initial: list[tuple[str, State]],
+        actions: dict[Fact, list[Factor]],
+        rng: random.Random,
+        report: Callable[[str], None],
+        *,
+        priors: list[list[tuple[str, State]]],
+        tellings: dict[Fact, list[Telling]],
+        parts: list[Part],
+    ) -> None:
+        super().__init__(initial, actions, rng, report)
+        for prior in priors:
+            drawn: State = draw(rng, prior)
+            self._state.update(drawn)
+        self._tellings = tellings
+        self.monitor = Monitor(parts, self._value)
+        truth = [in_words(fact) for prior in priors for fact in prior[0][1] if self._state[fact]]
+        report(f"the truth: {', '.join(truth) or 'nothing'}")
+        self._listen()
+
+    def _act(self, *action: str) -> Status:
+        status = super()._act(*action)
+        self._listen(*action)
+        return status
+
+    def _listen(self, *action: str) -> None:
+        if self.monitor.listens(*action):
+            readings = {
+                telling.name: self._reading(telling)
+                for telling in self._tellings.get(action, [])
+                if telling.when is None or telling.when(self._state)
+            }
+            self.monitor.told(*action, readings=readings)
+            told = [f"{name} {'true' if value else 'false'}" for name, value in readings.items()]
+            self._report(f"  told: {', '.join(told) or 'nothing'}; known: {self._words()}")
+        self._state.update(self.monitor.known())
+
+    def _reading(self, telling: Telling) -> bool:
+        false = str(1 - Fraction(telling.accuracy))
+        right = draw(self._rng, [(telling.accuracy, True), (false, False)])
+        return bool(telling.tells(self._state)) == right
+
+    def _words(self) -> str:
+        known = [each for each in self.monitor.known().items() if each[1] is not None]
+        words = [f"{'' if value else 'not '}{in_words(fact)}" for fact, value in known]
+        return self.monitor.outside or ", ".join(words) or "nothing"
+
+
+READS: dict[Fact, bool] = {("pressed", "base"): False, ("pressed", "lid"): False}
 """The facts that the tree reads, and whether they can be unknown."""
 
 
-INITIAL: list[tuple[str, State]] = [
-    (
-        "1",
-        {
-            ("pressed", "base"): False,
-            ("pressed", "lid"): False,
-            ("spoilt", "base"): False,
-            ("spoilt", "lid"): False,
-            ("upside-down", "base"): None,
-            ("upside-down", "lid"): None,
-            ("belief", "1", "1"): False,
-            ("belief", "1", "2"): False,
-        },
-    ),
-]
+INITIAL: list[tuple[str, State]] = [("1", {("pressed", "base"): False, ("pressed", "lid"): False})]
 """The states a run may start in, with their probabilities."""
 
 
 ACTIONS: dict[Fact, list[Factor]] = {
-    ("look", "base"): [
-        [
-            Outcome("1/2", {("upside-down", "base"): False}),
-            Outcome("1/2", {("upside-down", "base"): True}),
-        ],
-    ],
-    ("look", "lid"): [
-        [
-            Outcome(
-                "7/10",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                    ),
-                    {
-                        ("spoilt", "lid"): False,
-                        ("upside-down", "lid"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "3/10",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("belief", "1", "1")]),
-                        negated(s[("belief", "1", "2")]),
-                    ),
-                    {
-                        ("spoilt", "lid"): False,
-                        ("upside-down", "lid"): True,
-                        ("belief", "1", "1"): False,
-                        ("belief", "1", "2"): True,
-                    },
-                ),
-            ),
-        ],
-    ],
+    ("look", "base"): [[Outcome("1", {})]],
+    ("look", "lid"): [[Outcome("1", {})]],
     ("press", "base"): [
+        [Outcome("1", {("pressed", "base"): True})],
         [
             Outcome(
-                "1/2",
-                {("pressed", "base"): True},
+                "1",
+                {},
                 When(
-                    lambda s: all_of(s[("upside-down", "base")], negated(s[("spoilt", "base")])),
-                    {("spoilt", "base"): True},
-                ),
-                When(
-                    lambda s: s[("upside-down", "base")] is None,
-                    {("upside-down", "base"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {("pressed", "base"): True},
-                When(
-                    lambda s: all_of(s[("upside-down", "base")], negated(s[("spoilt", "base")])),
-                    {("spoilt", "base"): True},
-                ),
-                When(
-                    lambda s: s[("upside-down", "base")] is None,
-                    {("spoilt", "base"): True, ("upside-down", "base"): True},
+                    lambda s: s[("really upside-down", "base")],
+                    {("really spoilt", "base"): True},
                 ),
             ),
         ],
@@ -561,15 +743,7 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome(
                 "1",
                 {},
-                When(
-                    lambda s: all_of(s[("belief", "1", "1")], negated(s[("belief", "1", "2")])),
-                    {
-                        ("spoilt", "lid"): False,
-                        ("upside-down", "lid"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): False,
-                    },
-                ),
+                When(lambda s: s[("really upside-down", "lid")], {("really spoilt", "lid"): True}),
             ),
         ],
     ],
@@ -579,23 +753,12 @@ ACTIONS: dict[Fact, list[Factor]] = {
                 "1",
                 {},
                 When(
-                    lambda s: all_of(s[("spoilt", "base")], s[("upside-down", "base")]),
-                    {("upside-down", "base"): False},
+                    lambda s: s[("really upside-down", "base")],
+                    {("really upside-down", "base"): False},
                 ),
                 When(
-                    lambda s: all_of(s[("spoilt", "base")], negated(s[("upside-down", "base")])),
-                    {("upside-down", "base"): True},
-                ),
-                When(
-                    lambda s: all_of(s[("upside-down", "base")], negated(s[("spoilt", "base")])),
-                    {("upside-down", "base"): False},
-                ),
-                When(
-                    lambda s: all_of(
-                        negated(s[("upside-down", "base")]),
-                        negated(s[("spoilt", "base")]),
-                    ),
-                    {("upside-down", "base"): True},
+                    lambda s: negated(s[("really upside-down", "base")]),
+                    {("really upside-down", "base"): True},
                 ),
             ),
         ],
@@ -606,13 +769,12 @@ ACTIONS: dict[Fact, list[Factor]] = {
                 "1",
                 {},
                 When(
-                    lambda s: all_of(negated(s[("belief", "1", "1")]), s[("belief", "1", "2")]),
-                    {
-                        ("spoilt", "lid"): False,
-                        ("upside-down", "lid"): False,
-                        ("belief", "1", "1"): True,
-                        ("belief", "1", "2"): False,
-                    },
+                    lambda s: s[("really upside-down", "lid")],
+                    {("really upside-down", "lid"): False},
+                ),
+                When(
+                    lambda s: negated(s[("really upside-down", "lid")]),
+                    {("really upside-down", "lid"): True},
                 ),
             ),
         ],
@@ -621,17 +783,60 @@ ACTIONS: dict[Fact, list[Factor]] = {
 """What each action does: independent choices between outcomes."""
 
 
-class SimulatedWorld(World):
+MONITOR: list[Part] = [
+    Part(
+        [("spoilt", "base"), ("upside-down", "base")],
+        [(False, None), (False, False), (False, True)],
+        0,
+        {
+            ("look", "base"): Move([], ["upside-down(base)"], {(0, False): 1, (0, True): 2}),
+            ("press", "base"): Move([], ["spoilt(base)"], {(1, False): 1}),
+            ("turn", "base"): Move([], [], {(2,): 1}),
+        },
+    ),
+    Part(
+        [("spoilt", "lid"), ("upside-down", "lid")],
+        [(False, None), (False, False), (False, True)],
+        0,
+        {
+            ("look", "lid"): Move([], ["upside-down(lid)"], {(0, False): 1, (0, True): 2}),
+            ("press", "lid"): Move([], ["spoilt(lid)"], {(1, False): 1}),
+            ("turn", "lid"): Move([], [], {(2,): 1}),
+        },
+    ),
+]
+"""What is known, by what the robot was told. It has what the runs of the tree reach."""
+
+
+PRIORS: list[list[tuple[str, State]]] = [
+    [
+        ("1/2", {("really spoilt", "base"): False, ("really upside-down", "base"): False}),
+        ("1/2", {("really spoilt", "base"): False, ("really upside-down", "base"): True}),
+    ],
+    [
+        ("7/10", {("really spoilt", "lid"): False, ("really upside-down", "lid"): False}),
+        ("3/10", {("really spoilt", "lid"): False, ("really upside-down", "lid"): True}),
+    ],
+]
+"""What may be true at the start, with probabilities: independent choices."""
+
+
+TELLINGS: dict[Fact, list[Telling]] = {
+    ("look", "base"): [
+        Telling("upside-down(base)", "1", lambda s: s[("really upside-down", "base")]),
+    ],
+    ("look", "lid"): [Telling("upside-down(lid)", "1", lambda s: s[("really upside-down", "lid")])],
+    ("press", "base"): [Telling("spoilt(base)", "1", lambda s: s[("really spoilt", "base")])],
+    ("press", "lid"): [Telling("spoilt(lid)", "1", lambda s: s[("really spoilt", "lid")])],
+}
+"""What each action tells."""
+
+
+class SimulatedWorld(HiddenWorld):
     """Plays the robot."""
 
     def pressed(self, part: str) -> bool | None:
         return self._value("pressed", part)
-
-    def spoilt(self, part: str) -> bool | None:
-        return self._value("spoilt", part)
-
-    def upside_down(self, part: str) -> bool | None:
-        return self._value("upside-down", part)
 
     def look(self, part: str) -> Status:
         return self._act("look", part)
@@ -645,7 +850,14 @@ class SimulatedWorld(World):
 
 def main() -> None:
     """Run the tree in the simulated world."""
-    simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+    def make(rng: random.Random, report: Callable[[str], None]) -> Behaviour:
+        world = SimulatedWorld(
+            INITIAL, ACTIONS, rng, report, priors=PRIORS, tellings=TELLINGS, parts=MONITOR
+        )
+        return create_root(world)
+
+    simulate(make)
 
 
 if __name__ == "__main__":

@@ -32,23 +32,18 @@ class Robot(Protocol):
 
     A condition answers at once: True, False, or None where it is unknown. An action is called in
     every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
-    conditions show what it did.
+    conditions show what it did. What is hidden the tree asks the monitor, Monitor(MONITOR, ...):
+    tell that, by monitor.told, what every action of MONITOR told, in the moment in which its
+    effects are seen.
     """
+
+    monitor: Monitor
 
     def cancel(self, action: str) -> None:
         """The running action, named as in the tree, is no longer wanted."""
 
-    def holding(self) -> bool | None:
-        """Whether holding() holds."""
-
     def robot_at(self, shelf: str) -> bool | None:
         """Whether robot-at(shelf) holds."""
-
-    def spilt(self) -> bool | None:
-        """Whether spilt() holds."""
-
-    def tin_at(self, shelf: str) -> bool | None:
-        """Whether tin-at(shelf) holds; None where that is unknown."""
 
     def drive(self, arg_from: str, to: str) -> Status:
         """Start or continue drive(arg_from, to)."""
@@ -296,16 +291,19 @@ def run(root: Behaviour, period: float = 0.0) -> Status:
 
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
-    return StopWhenBlocked(
+    return StopOutside(
         robot,
         fallback(
             "fallback",
-            Condition("holding()", robot.holding),
+            Condition("holding()", lambda: robot.monitor.value("holding")),
             sequence(
                 "sequence",
                 Condition(
                     "(known tin-at(middle) and tin-at(middle))",
-                    lambda: all_of(robot.tin_at("middle") is not None, robot.tin_at("middle")),
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "middle") is not None,
+                        robot.monitor.value("tin-at", "middle"),
+                    ),
                 ),
                 Latch(
                     "drive(left,middle)",
@@ -319,7 +317,10 @@ def create_root(robot: Robot) -> Behaviour:
                 "sequence",
                 Condition(
                     "(known tin-at(right) and tin-at(right))",
-                    lambda: all_of(robot.tin_at("right") is not None, robot.tin_at("right")),
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "right") is not None,
+                        robot.monitor.value("tin-at", "right"),
+                    ),
                 ),
                 Latch(
                     "drive(middle,right)",
@@ -333,16 +334,18 @@ def create_root(robot: Robot) -> Behaviour:
                 "for holding()",
                 Condition(
                     "(known tin-at(right) and tin-at(right))",
-                    lambda: all_of(robot.tin_at("right") is not None, robot.tin_at("right")),
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "right") is not None,
+                        robot.monitor.value("tin-at", "right"),
+                    ),
                 ),
                 Latch(
                     "grasp(right)",
-                    lambda: robot.grasp("right"),
-                    robot.cancel,
+                    *watched(robot, ("grasp", "right"), lambda: robot.grasp("right")),
                     guard=lambda: all_of(
                         robot.robot_at("right"),
-                        negated(robot.holding()),
-                        negated(robot.spilt()),
+                        negated(robot.monitor.value("holding")),
+                        negated(robot.monitor.value("spilt")),
                     ),
                     keep=False,
                 ),
@@ -352,8 +355,8 @@ def create_root(robot: Robot) -> Behaviour:
                 Condition(
                     "(known tin-at(right) and not tin-at(right))",
                     lambda: all_of(
-                        robot.tin_at("right") is not None,
-                        negated(robot.tin_at("right")),
+                        robot.monitor.value("tin-at", "right") is not None,
+                        negated(robot.monitor.value("tin-at", "right")),
                     ),
                 ),
                 Latch(
@@ -368,7 +371,10 @@ def create_root(robot: Robot) -> Behaviour:
                 "for robot-at(right)",
                 Condition(
                     "(known tin-at(right) and tin-at(right))",
-                    lambda: all_of(robot.tin_at("right") is not None, robot.tin_at("right")),
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "right") is not None,
+                        robot.monitor.value("tin-at", "right"),
+                    ),
                 ),
                 Latch(
                     "drive(left,right)",
@@ -380,25 +386,29 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             Latch(
                 "look(left)",
-                lambda: robot.look("left"),
-                robot.cancel,
-                guard=lambda: all_of(robot.robot_at("left"), robot.tin_at("left") is None),
+                *watched(robot, ("look", "left"), lambda: robot.look("left")),
+                guard=lambda: all_of(
+                    robot.robot_at("left"),
+                    robot.monitor.value("tin-at", "left") is None,
+                ),
                 keep=False,
             ),
             sequence(
                 "for holding()",
                 Condition(
                     "(known tin-at(middle) and tin-at(middle))",
-                    lambda: all_of(robot.tin_at("middle") is not None, robot.tin_at("middle")),
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "middle") is not None,
+                        robot.monitor.value("tin-at", "middle"),
+                    ),
                 ),
                 Latch(
                     "grasp(middle)",
-                    lambda: robot.grasp("middle"),
-                    robot.cancel,
+                    *watched(robot, ("grasp", "middle"), lambda: robot.grasp("middle")),
                     guard=lambda: all_of(
                         robot.robot_at("middle"),
-                        negated(robot.holding()),
-                        negated(robot.spilt()),
+                        negated(robot.monitor.value("holding")),
+                        negated(robot.monitor.value("spilt")),
                     ),
                     keep=False,
                 ),
@@ -408,8 +418,8 @@ def create_root(robot: Robot) -> Behaviour:
                 Condition(
                     "(known tin-at(middle) and not tin-at(middle))",
                     lambda: all_of(
-                        robot.tin_at("middle") is not None,
-                        negated(robot.tin_at("middle")),
+                        robot.monitor.value("tin-at", "middle") is not None,
+                        negated(robot.monitor.value("tin-at", "middle")),
                     ),
                 ),
                 Latch(
@@ -424,16 +434,18 @@ def create_root(robot: Robot) -> Behaviour:
                 "for holding()",
                 Condition(
                     "(known tin-at(left) and tin-at(left))",
-                    lambda: all_of(robot.tin_at("left") is not None, robot.tin_at("left")),
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "left") is not None,
+                        robot.monitor.value("tin-at", "left"),
+                    ),
                 ),
                 Latch(
                     "grasp(left)",
-                    lambda: robot.grasp("left"),
-                    robot.cancel,
+                    *watched(robot, ("grasp", "left"), lambda: robot.grasp("left")),
                     guard=lambda: all_of(
                         robot.robot_at("left"),
-                        negated(robot.holding()),
-                        negated(robot.spilt()),
+                        negated(robot.monitor.value("holding")),
+                        negated(robot.monitor.value("spilt")),
                     ),
                     keep=False,
                 ),
@@ -447,7 +459,10 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "for robot-at(right)",
-                Condition("unknown tin-at(right)", lambda: robot.tin_at("right") is None),
+                Condition(
+                    "unknown tin-at(right)",
+                    lambda: robot.monitor.value("tin-at", "right") is None,
+                ),
                 Latch(
                     "drive(middle,right)",
                     lambda: robot.drive("middle", "right"),
@@ -458,16 +473,21 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             Latch(
                 "look(middle)",
-                lambda: robot.look("middle"),
-                robot.cancel,
-                guard=lambda: all_of(robot.robot_at("middle"), robot.tin_at("middle") is None),
+                *watched(robot, ("look", "middle"), lambda: robot.look("middle")),
+                guard=lambda: all_of(
+                    robot.robot_at("middle"),
+                    robot.monitor.value("tin-at", "middle") is None,
+                ),
                 keep=False,
             ),
             sequence(
                 "for robot-at(left)",
                 Condition(
                     "(known tin-at(left) and tin-at(left))",
-                    lambda: all_of(robot.tin_at("left") is not None, robot.tin_at("left")),
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "left") is not None,
+                        robot.monitor.value("tin-at", "left"),
+                    ),
                 ),
                 Latch(
                     "drive(right,left)",
@@ -479,7 +499,10 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "for robot-at(left)",
-                Condition("unknown tin-at(left)", lambda: robot.tin_at("left") is None),
+                Condition(
+                    "unknown tin-at(left)",
+                    lambda: robot.monitor.value("tin-at", "left") is None,
+                ),
                 Latch(
                     "drive(right,left)",
                     lambda: robot.drive("right", "left"),
@@ -490,9 +513,11 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             Latch(
                 "look(right)",
-                lambda: robot.look("right"),
-                robot.cancel,
-                guard=lambda: all_of(robot.robot_at("right"), robot.tin_at("right") is None),
+                *watched(robot, ("look", "right"), lambda: robot.look("right")),
+                guard=lambda: all_of(
+                    robot.robot_at("right"),
+                    robot.monitor.value("tin-at", "right") is None,
+                ),
                 keep=False,
             ),
             Latch(
@@ -616,15 +641,256 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
         print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
 
 
+Entry = int | bool | None
+Rows = dict[tuple[Entry, ...], int]
+
+
+class Move:
+    """What an action may tell. ``rows`` lead from what was believed, the ``seen`` facts before the
+    action, the ``readings`` (None: not made), and the seen facts after it, to what is believed
+    then."""
+
+    def __init__(self, seen: list[Fact], readings: list[str], rows: Rows) -> None:
+        self.seen = seen
+        self.readings = readings
+        self.rows = rows
+
+
+class Part:
+    """Facts that depend on each other: what is known of them (None: it is unknown) in each belief,
+    by number, the belief to begin with, and what each action may tell of them."""
+
+    def __init__(
+        self,
+        facts: list[Fact],
+        values: list[tuple[bool | None, ...]],
+        start: int,
+        moves: dict[Fact, Move],
+    ) -> None:
+        self.facts = facts
+        self.values = values
+        self.start = start
+        self.moves = moves
+
+
+class Monitor:
+    """Knows of hidden facts what follows from all that the robot was told. ``see`` tells what the
+    robot sees of a fact that is not hidden.
+
+    Call :meth:`told` for every action that tells anything, in the moment in which its effects are
+    seen. What cannot be in the model ends that: :attr:`outside` says what it was, and nothing is
+    known from then on.
+    """
+
+    def __init__(self, parts: list[Part], see: Callable[..., bool | None]) -> None:
+        self.outside = ""
+        self._parts = parts
+        self._see = see
+        self._beliefs = [part.start for part in parts]
+        self._place: dict[Fact, tuple[int, int]] = {}
+        for number, part in enumerate(parts):
+            self._place.update((fact, (number, at)) for at, fact in enumerate(part.facts))
+        self._before: dict[Fact, list[tuple[bool | None, ...]]] = {}
+        self._waits = self.listens()
+
+    def listens(self, *action: str) -> bool:
+        """Does the action tell anything? Without an action: is anything told before the first?"""
+        return any(action in part.moves for part in self._parts)
+
+    def waits(self) -> bool:
+        """Is what the robot is told before its first action still missing?"""
+        return self._waits
+
+    def value(self, *fact: str) -> bool | None:
+        """What is known of a hidden fact: None if it is unknown."""
+        if self.outside:
+            return None
+        number, at = self._place[fact]
+        return self._parts[number].values[self._beliefs[number]][at]
+
+    def known(self) -> State:
+        """What is known of every fact."""
+        return {fact: self.value(*fact) for fact in self._place}
+
+    def begin(self, *action: str) -> None:
+        """The action starts. The tree calls this."""
+        if not self.listens(*action):
+            return
+        for earlier in self._before:
+            self._leave(f"{in_words(earlier)} told nothing")
+        moves = [part.moves.get(action) for part in self._parts]
+        self._before[action] = [
+            tuple(self._see(*fact) for fact in move.seen) if move else () for move in moves
+        ]
+
+    def told(self, *action: str, readings: Mapping[str, bool | None] | None = None) -> None:
+        """What the action told: of each observation that was made, by name, whether it seemed true.
+        Seen facts are read now, but for those that stand here, too, by name. Without an action:
+        what the robot was told before its first one."""
+        if not self.listens(*action):
+            return
+        told = dict(readings or {})
+        name = in_words(action) if action else "what is told at the start"
+        before = self._before.pop(action, None)
+        if before is None and not (self._waits and not action):
+            self._leave(f"{name}: it was not started")
+            return
+        self._waits = self._waits and action != ()
+        used: set[str] = set()
+        for number, part in enumerate(self._parts):
+            move = part.moves.get(action)
+            if move is None:
+                continue
+            after = [told[in_words(f)] if in_words(f) in told else self._see(*f) for f in move.seen]
+            used.update(move.readings, map(in_words, move.seen))
+            read = [told.get(reading) for reading in move.readings]
+            # Before the first action nothing has changed.
+            seen = tuple(after) if before is None else before[number]
+            row = move.rows.get((self._beliefs[number], *seen, *read, *after))
+            if row is None:
+                names = [*move.readings, *map(in_words, move.seen)]
+                what = [f"{n} {v}" for n, v in zip(names, [*read, *after], strict=True)]
+                self._leave(f"{name}: {', '.join(what) or 'at this point'}")
+            else:
+                self._beliefs[number] = row
+        for reading in told.keys() - used:
+            self._leave(f"{name}: it has no reading {reading}")
+
+    def _leave(self, why: str) -> None:
+        self.outside = self.outside or f"outside the model: {why}"
+
+
+class WithMonitor(Protocol):
+    """A robot with a monitor."""
+
+    monitor: Monitor
+
+    def cancel(self, action: str) -> None:
+        """The running action is no longer wanted."""
+
+
+def watched(
+    robot: WithMonitor, action: Fact, act: Callable[[], Status]
+) -> tuple[Callable[[], Status], Callable[[str], None]]:
+    """The calls that run and cancel an action, so that the monitor learns when it starts."""
+    running = False
+
+    def go_on() -> Status:
+        nonlocal running
+        if not running:
+            robot.monitor.begin(*action)
+        running = True
+        status = act()
+        running = status == Status.RUNNING
+        return status
+
+    def cancel(name: str) -> None:
+        nonlocal running
+        running = False
+        robot.cancel(name)
+
+    return go_on, cancel
+
+
+class StopOutside(StopWhenBlocked):
+    """The root of a tree of a robot with a monitor: FAILURE, too, where what happened is outside
+    the model. Before its first tick the tree waits for what the robot is told before its first
+    action."""
+
+    def __init__(
+        self, robot: WithMonitor, child: Behaviour, reads: Mapping[Fact, bool] | None = None
+    ) -> None:
+        super().__init__(robot, child, reads)
+        self._watching = robot
+
+    def tick(self) -> Iterator[Behaviour]:
+        monitor = self._watching.monitor
+        if not monitor.outside and not monitor.waits():
+            yield from super().tick()
+            return
+        if monitor.outside:
+            self.feedback_message = monitor.outside
+            self.stop(Status.FAILURE)
+        else:
+            self.feedback_message = "waiting for what is told at the start"
+            self.status = Status.RUNNING
+        yield self
+
+
+class Telling:
+    """An observation of a simulated action: its name, how probably it is right, what it tells of,
+    and when it is made (None: always)."""
+
+    def __init__(
+        self,
+        name: str,
+        accuracy: str,
+        tells: Callable[[State], bool | None],
+        when: Callable[[State], bool | None] | None = None,
+    ) -> None:
+        self.name = name
+        self.accuracy = accuracy
+        self.tells = tells
+        self.when = when
+
+
+class HiddenWorld(World):
+    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``,
+    and the robot is told no more than ``tellings`` say."""
+
+    def __init__(
+        self,
+        initial: list[tuple[str, State]],
+        actions: dict[Fact, list[Factor]],
+        rng: random.Random,
+        report: Callable[[str], None],
+        *,
+        priors: list[list[tuple[str, State]]],
+        tellings: dict[Fact, list[Telling]],
+        parts: list[Part],
+    ) -> None:
+        super().__init__(initial, actions, rng, report)
+        for prior in priors:
+            drawn: State = draw(rng, prior)
+            self._state.update(drawn)
+        self._tellings = tellings
+        self.monitor = Monitor(parts, self._value)
+        truth = [in_words(fact) for prior in priors for fact in prior[0][1] if self._state[fact]]
+        report(f"the truth: {', '.join(truth) or 'nothing'}")
+        self._listen()
+
+    def _act(self, *action: str) -> Status:
+        status = super()._act(*action)
+        self._listen(*action)
+        return status
+
+    def _listen(self, *action: str) -> None:
+        if self.monitor.listens(*action):
+            readings = {
+                telling.name: self._reading(telling)
+                for telling in self._tellings.get(action, [])
+                if telling.when is None or telling.when(self._state)
+            }
+            self.monitor.told(*action, readings=readings)
+            told = [f"{name} {'true' if value else 'false'}" for name, value in readings.items()]
+            self._report(f"  told: {', '.join(told) or 'nothing'}; known: {self._words()}")
+        self._state.update(self.monitor.known())
+
+    def _reading(self, telling: Telling) -> bool:
+        false = str(1 - Fraction(telling.accuracy))
+        right = draw(self._rng, [(telling.accuracy, True), (false, False)])
+        return bool(telling.tells(self._state)) == right
+
+    def _words(self) -> str:
+        known = [each for each in self.monitor.known().items() if each[1] is not None]
+        words = [f"{'' if value else 'not '}{in_words(fact)}" for fact, value in known]
+        return self.monitor.outside or ", ".join(words) or "nothing"
+
+
 READS: dict[Fact, bool] = {
-    ("holding",): False,
     ("robot-at", "left"): False,
     ("robot-at", "middle"): False,
     ("robot-at", "right"): False,
-    ("spilt",): False,
-    ("tin-at", "left"): True,
-    ("tin-at", "middle"): True,
-    ("tin-at", "right"): True,
 }
 """The facts that the tree reads, and whether they can be unknown."""
 
@@ -632,16 +898,7 @@ READS: dict[Fact, bool] = {
 INITIAL: list[tuple[str, State]] = [
     (
         "1",
-        {
-            ("holding",): False,
-            ("robot-at", "left"): True,
-            ("robot-at", "middle"): False,
-            ("robot-at", "right"): False,
-            ("spilt",): False,
-            ("tin-at", "left"): None,
-            ("tin-at", "middle"): None,
-            ("tin-at", "right"): None,
-        },
+        {("robot-at", "left"): True, ("robot-at", "middle"): False, ("robot-at", "right"): False},
     ),
 ]
 """The states a run may start in, with their probabilities."""
@@ -671,95 +928,8 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome(
                 "1",
                 {},
-                When(lambda s: s[("tin-at", "right")], {("spilt",): True}),
-                When(lambda s: s[("tin-at", "middle")], {("spilt",): True}),
-                When(
-                    lambda s: all_of(
-                        negated(s[("tin-at", "left")]),
-                        s[("tin-at", "middle")] is None,
-                    ),
-                    {("spilt",): True},
-                ),
-                When(lambda s: s[("tin-at", "left")], {("holding",): True}),
-            ),
-        ],
-        [
-            Outcome(
-                "1/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {
-                        ("holding",): True,
-                        ("tin-at", "left"): True,
-                        ("tin-at", "middle"): False,
-                        ("tin-at", "right"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "2/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {("spilt",): True, ("tin-at", "left"): False},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "right")]),
-                    ),
-                    {("holding",): True, ("tin-at", "left"): True, ("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "right")]),
-                    ),
-                    {("spilt",): True, ("tin-at", "left"): False, ("tin-at", "middle"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "middle")]),
-                    ),
-                    {("holding",): True, ("tin-at", "left"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "middle")]),
-                    ),
-                    {("spilt",): True, ("tin-at", "left"): False, ("tin-at", "right"): True},
-                ),
+                When(lambda s: s[("really tin-at", "left")], {("really holding",): True}),
+                When(lambda s: negated(s[("really tin-at", "left")]), {("really spilt",): True}),
             ),
         ],
     ],
@@ -768,95 +938,8 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome(
                 "1",
                 {},
-                When(lambda s: s[("tin-at", "right")], {("spilt",): True}),
-                When(lambda s: s[("tin-at", "middle")], {("holding",): True}),
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "middle")]),
-                    ),
-                    {("spilt",): True},
-                ),
-                When(lambda s: s[("tin-at", "left")], {("spilt",): True}),
-            ),
-        ],
-        [
-            Outcome(
-                "2/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {("spilt",): True, ("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {
-                        ("holding",): True,
-                        ("tin-at", "left"): False,
-                        ("tin-at", "middle"): True,
-                        ("tin-at", "right"): False,
-                    },
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "right")]),
-                    ),
-                    {("spilt",): True, ("tin-at", "left"): True, ("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "right")]),
-                    ),
-                    {("holding",): True, ("tin-at", "left"): False, ("tin-at", "middle"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("tin-at", "left")]),
-                        s[("tin-at", "middle")] is None,
-                    ),
-                    {("holding",): True, ("tin-at", "middle"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("tin-at", "left")]),
-                        s[("tin-at", "middle")] is None,
-                    ),
-                    {("spilt",): True, ("tin-at", "middle"): False, ("tin-at", "right"): True},
-                ),
+                When(lambda s: s[("really tin-at", "middle")], {("really holding",): True}),
+                When(lambda s: negated(s[("really tin-at", "middle")]), {("really spilt",): True}),
             ),
         ],
     ],
@@ -865,428 +948,98 @@ ACTIONS: dict[Fact, list[Factor]] = {
             Outcome(
                 "1",
                 {},
-                When(lambda s: s[("tin-at", "right")], {("holding",): True}),
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "right")]),
-                    ),
-                    {("spilt",): True},
-                ),
-                When(lambda s: s[("tin-at", "middle")], {("spilt",): True}),
-                When(lambda s: s[("tin-at", "left")], {("spilt",): True}),
-            ),
-        ],
-        [
-            Outcome(
-                "2/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {("spilt",): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {
-                        ("holding",): True,
-                        ("tin-at", "left"): False,
-                        ("tin-at", "middle"): False,
-                        ("tin-at", "right"): True,
-                    },
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "middle")]),
-                    ),
-                    {("spilt",): True, ("tin-at", "left"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        s[("tin-at", "left")] is None,
-                        negated(s[("tin-at", "middle")]),
-                    ),
-                    {("holding",): True, ("tin-at", "left"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("tin-at", "left")]),
-                        s[("tin-at", "middle")] is None,
-                    ),
-                    {("spilt",): True, ("tin-at", "middle"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("tin-at", "left")]),
-                        s[("tin-at", "middle")] is None,
-                    ),
-                    {("holding",): True, ("tin-at", "middle"): False, ("tin-at", "right"): True},
-                ),
+                When(lambda s: s[("really tin-at", "right")], {("really holding",): True}),
+                When(lambda s: negated(s[("really tin-at", "right")]), {("really spilt",): True}),
             ),
         ],
     ],
-    ("look", "left"): [
-        [
-            Outcome(
-                "1/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("spilt",)]),
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {
-                        ("tin-at", "left"): True,
-                        ("tin-at", "middle"): False,
-                        ("tin-at", "right"): False,
-                    },
-                ),
-            ),
-            Outcome(
-                "2/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("spilt",)]),
-                        s[("tin-at", "middle")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {("tin-at", "left"): False},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "right")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): True, ("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "right")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): False, ("tin-at", "middle"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "middle")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "middle")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], s[("tin-at", "middle")] is None),
-                    {("tin-at", "left"): True, ("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], s[("tin-at", "middle")] is None),
-                    {("tin-at", "left"): False, ("tin-at", "middle"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], negated(s[("tin-at", "middle")])),
-                    {("tin-at", "left"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], negated(s[("tin-at", "middle")])),
-                    {("tin-at", "left"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-    ],
-    ("look", "middle"): [
-        [
-            Outcome(
-                "2/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("spilt",)]),
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("spilt",)]),
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "right")] is None,
-                    ),
-                    {
-                        ("tin-at", "left"): False,
-                        ("tin-at", "middle"): True,
-                        ("tin-at", "right"): False,
-                    },
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "right")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): True, ("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "right")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): False, ("tin-at", "middle"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "left")]), negated(s[("spilt",)])),
-                    {("tin-at", "middle"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "left")]), negated(s[("spilt",)])),
-                    {("tin-at", "middle"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], s[("tin-at", "left")] is None),
-                    {("tin-at", "left"): True, ("tin-at", "middle"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], s[("tin-at", "left")] is None),
-                    {("tin-at", "left"): False, ("tin-at", "middle"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], negated(s[("tin-at", "left")])),
-                    {("tin-at", "middle"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], negated(s[("tin-at", "left")])),
-                    {("tin-at", "middle"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-    ],
-    ("look", "right"): [
-        [
-            Outcome(
-                "2/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("spilt",)]),
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                    ),
-                    {("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/3",
-                {},
-                When(
-                    lambda s: all_of(
-                        negated(s[("spilt",)]),
-                        s[("tin-at", "left")] is None,
-                        s[("tin-at", "middle")] is None,
-                    ),
-                    {
-                        ("tin-at", "left"): False,
-                        ("tin-at", "middle"): False,
-                        ("tin-at", "right"): True,
-                    },
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "middle")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "middle")]), negated(s[("spilt",)])),
-                    {("tin-at", "left"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "left")]), negated(s[("spilt",)])),
-                    {("tin-at", "middle"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(negated(s[("tin-at", "left")]), negated(s[("spilt",)])),
-                    {("tin-at", "middle"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], s[("tin-at", "left")] is None),
-                    {("tin-at", "left"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], s[("tin-at", "left")] is None),
-                    {("tin-at", "left"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-        [
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], negated(s[("tin-at", "left")])),
-                    {("tin-at", "middle"): True, ("tin-at", "right"): False},
-                ),
-            ),
-            Outcome(
-                "1/2",
-                {},
-                When(
-                    lambda s: all_of(s[("spilt",)], negated(s[("tin-at", "left")])),
-                    {("tin-at", "middle"): False, ("tin-at", "right"): True},
-                ),
-            ),
-        ],
-    ],
+    ("look", "left"): [[Outcome("1", {})]],
+    ("look", "middle"): [[Outcome("1", {})]],
+    ("look", "right"): [[Outcome("1", {})]],
 }
 """What each action does: independent choices between outcomes."""
 
 
-class SimulatedWorld(World):
-    """Plays the robot."""
+MONITOR: list[Part] = [
+    Part(
+        [("holding",), ("spilt",), ("tin-at", "left"), ("tin-at", "middle"), ("tin-at", "right")],
+        [
+            (False, False, None, None, None),
+            (False, False, False, None, None),
+            (False, False, True, False, False),
+            (True, False, True, False, False),
+            (False, False, False, False, True),
+            (False, False, False, True, False),
+            (True, False, False, False, True),
+            (True, False, False, True, False),
+        ],
+        0,
+        {
+            ("grasp", "left"): Move([], ["holding()"], {(2, True): 3}),
+            ("grasp", "middle"): Move([], ["holding()"], {(5, True): 7}),
+            ("grasp", "right"): Move([], ["holding()"], {(4, True): 6}),
+            ("look", "left"): Move([], ["tin-at(left)"], {(0, True): 2, (0, False): 1}),
+            ("look", "middle"): Move([], ["tin-at(middle)"], {}),
+            ("look", "right"): Move([], ["tin-at(right)"], {(1, False): 5, (1, True): 4}),
+        },
+    ),
+]
+"""What is known, by what the robot was told. It has what the runs of the tree reach."""
 
-    def holding(self) -> bool | None:
-        return self._value("holding")
+
+PRIORS: list[list[tuple[str, State]]] = [
+    [
+        (
+            "1/3",
+            {
+                ("really holding",): False,
+                ("really spilt",): False,
+                ("really tin-at", "left"): True,
+                ("really tin-at", "middle"): False,
+                ("really tin-at", "right"): False,
+            },
+        ),
+        (
+            "1/3",
+            {
+                ("really holding",): False,
+                ("really spilt",): False,
+                ("really tin-at", "left"): False,
+                ("really tin-at", "middle"): True,
+                ("really tin-at", "right"): False,
+            },
+        ),
+        (
+            "1/3",
+            {
+                ("really holding",): False,
+                ("really spilt",): False,
+                ("really tin-at", "left"): False,
+                ("really tin-at", "middle"): False,
+                ("really tin-at", "right"): True,
+            },
+        ),
+    ],
+]
+"""What may be true at the start, with probabilities: independent choices."""
+
+
+TELLINGS: dict[Fact, list[Telling]] = {
+    ("grasp", "left"): [Telling("holding()", "1", lambda s: s[("really holding",)])],
+    ("grasp", "middle"): [Telling("holding()", "1", lambda s: s[("really holding",)])],
+    ("grasp", "right"): [Telling("holding()", "1", lambda s: s[("really holding",)])],
+    ("look", "left"): [Telling("tin-at(left)", "1", lambda s: s[("really tin-at", "left")])],
+    ("look", "middle"): [Telling("tin-at(middle)", "1", lambda s: s[("really tin-at", "middle")])],
+    ("look", "right"): [Telling("tin-at(right)", "1", lambda s: s[("really tin-at", "right")])],
+}
+"""What each action tells."""
+
+
+class SimulatedWorld(HiddenWorld):
+    """Plays the robot."""
 
     def robot_at(self, shelf: str) -> bool | None:
         return self._value("robot-at", shelf)
-
-    def spilt(self) -> bool | None:
-        return self._value("spilt")
-
-    def tin_at(self, shelf: str) -> bool | None:
-        return self._value("tin-at", shelf)
 
     def drive(self, arg_from: str, to: str) -> Status:
         return self._act("drive", arg_from, to)
@@ -1300,7 +1053,14 @@ class SimulatedWorld(World):
 
 def main() -> None:
     """Run the tree in the simulated world."""
-    simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+    def make(rng: random.Random, report: Callable[[str], None]) -> Behaviour:
+        world = SimulatedWorld(
+            INITIAL, ACTIONS, rng, report, priors=PRIORS, tellings=TELLINGS, parts=MONITOR
+        )
+        return create_root(world)
+
+    simulate(make)
 
 
 if __name__ == "__main__":
