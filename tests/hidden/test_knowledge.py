@@ -204,6 +204,20 @@ def test_a_fact_made_unknown_is_drawn_anew() -> None:
     assert best(task_of(text.replace("(unknown (heads))) (:goal", ") (:goal"))) == (1, 5)
 
 
+def test_what_is_set_to_what_it_was_shows_nothing() -> None:
+    """The lamp is lit already, so nobody sees which of two things happened."""
+    text = """(define (domain d) (:predicates (lit) (won) (dark) (done))
+      (:action spin :effect (oneof (lit) (won)))
+      (:action darken :effect (and (dark) (not (lit))))
+      (:action look :observe (won))
+      (:action claim :precondition (and (lit) (won) (not (dark))) :effect (done)))
+      (define (problem x) (:domain d) (:init (lit)) (:goal (done)))"""
+    # Nobody knows after a spin; a look tells.
+    task = task_of(text)
+    found = [bbtc.bounds(task, max_actions=steps).upper for steps in (2, 3)]
+    assert found == [0, Fraction(1, 2)]
+
+
 def test_what_is_drawn_anew_may_become_what_it_never_was() -> None:
     """A coin that lies heads up at the start may fall on tails."""
     text = """(define (domain d) (:predicates (heads) (won))
