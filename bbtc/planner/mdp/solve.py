@@ -24,7 +24,7 @@ FEW_STATES = 100_000
 FEW_BELIEFS = 2_000
 """The same where there may be beliefs without end, whose weights have ever more digits."""
 
-_FEW_IN_ALL = FEW_BELIEFS // 2
+_FEW_IN_ALL = FEW_BELIEFS // 4
 """So many are looked at to see whether they end after all: then the least cost is known, too."""
 
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space
