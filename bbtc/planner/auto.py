@@ -223,7 +223,10 @@ class _Auto:
         task, target, options = self.task, self.target, self.options
         self.add(plan_policy(task, target, self.limits.part(_POLICY_SHARE), _silent, options))
         if not self.interrupted:
-            self.add(plan_search(task, target, self.limits.part(_SEARCH_SHARE), _silent, options))
+            limits = self.limits
+            if self.met and task.endless_beliefs:  # trees that ask without end would use up all states
+                limits = replace(limits, states=min(limits.states, _FEW_STATES))
+            self.add(self.searched(limits))
         if not self.interrupted and not self.met:
             self.add(self.refinement(refined))
 
