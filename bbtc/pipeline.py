@@ -505,7 +505,7 @@ def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
     ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer."""
     from bbtc.verifier.verdict import verify
 
-    return verify(without_hidden(tree, limits), limits, engine)
+    return verify(without_hidden(tree, limits), limits, engine, tree.task if tree.task.components else None)
 
 
 def without_hidden(tree: Tree, limits: Limits) -> Tree:

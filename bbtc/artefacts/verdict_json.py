@@ -37,6 +37,7 @@ def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
         "claimed": figure_text(tree.success_probability),
         "verified": not verdict.problems,
         "own": None if verdict.own is None else _own(verdict.own),
+        **({"worlds": _worlds(verdict.worlds)} if verdict.hidden else {}),
         "storm": None if verdict.storm is None else _storm(verdict.storm),
         "problems": [{"code": problem.code, "message": problem.message} for problem in verdict.problems],
     }
@@ -45,6 +46,14 @@ def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
 def _own(found: Recomputed) -> dict[str, Any]:
     figures: dict[str, Any] = {name: _figure(found.figure(name)) for name in _FIGURES}
     return figures | {"states": found.states}
+
+
+def _worlds(found: Recomputed | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    figures = {name: _figure(found.figure(name)) for name in _FIGURES}
+    figures["success"] = figure_text(found.success - found.without_goal)
+    return figures | {"mistaken": figure_text(found.without_goal), "states": found.states}
 
 
 def _storm(found: StormFigures) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.rounding import decimal
 from bbtc.tree.nodes import Tree
@@ -17,6 +18,7 @@ from bbtc.verifier.explore import explore
 from bbtc.verifier.prism import counted
 from bbtc.verifier.program import REWARDS, Program
 from bbtc.verifier.solve import Recomputed, recompute
+from bbtc.verifier.worlds import space_of
 
 Engine: TypeAlias = Literal["auto", "own", "storm", "all"]
 
@@ -44,12 +46,15 @@ class StormFigures:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The figures that each engine found (None: it was not asked), and every disagreement."""
+    """The figures that each engine found (None: it was not asked), and every disagreement. Where facts are
+    ``hidden``, ``worlds`` are the figures of the runs world by world (None: there are too many of them)."""
 
     tree: Tree
     own: Recomputed | None
     storm: StormFigures | None
     problems: tuple[Diagnostic, ...]
+    hidden: bool = False
+    worlds: Recomputed | None = None
 
     def raise_problems(self) -> None:
         """Raise :class:`BbtcError` unless the tree is what it claims to be."""
@@ -57,18 +62,22 @@ class Verdict:
             raise BbtcError(self.problems)
 
 
-def verify(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
-    """Recompute the figures of a tree. ``auto`` asks Storm, too, where it is installed.
+def verify(tree: Tree, limits: Limits, engine: Engine = "auto", hidden: Task | None = None) -> Verdict:
+    """Recompute the figures of a tree. ``auto`` asks Storm, too, where it is installed. ``hidden`` is the
+    task with hidden facts that the task of the tree stands for: our own solver looks at its worlds, too.
 
     Raises ``LimitReached``, and :class:`BbtcError` where Storm is wanted and cannot answer; what
     disagrees stands in the verdict.
     """
-    own = found = None
+    own = found = worlds = None
     if engine != "storm":
         own = recompute(explore(solvable_chain(tree.task, tree.root), limits), limits)
+        space = None if hidden is None else space_of(hidden, tree.root, limits)
+        worlds = None if space is None else recompute(space, limits)
     if engine in {"storm", "all"} or (engine == "auto" and storm.is_installed()):
         found = _ask_storm(chain_of(tree.task, tree.root), limits)
-    return Verdict(tree, own, found, tuple(_problems(tree, own, found)))
+    looked = _Looked(own, found, hidden is not None, worlds)
+    return Verdict(tree, own, found, tuple(_problems(tree, looked)), looked.hidden, worlds)
 
 
 def _ask_storm(program: Program, limits: Limits) -> StormFigures:
@@ -80,22 +89,50 @@ def _ask_storm(program: Program, limits: Limits) -> StormFigures:
     return StormFigures(answers.version, answers.states, answers.exact, figures)
 
 
-def _problems(tree: Tree, own: Recomputed | None, found: StormFigures | None) -> Iterator[Diagnostic]:
-    claimed = tree.success_probability
-    if own is not None and own.success != claimed:
-        yield _disagreement(
-            f"the tree claims a success probability of {_shown(claimed)}; it is {_shown(own.success)}"
-        )
-    if found is not None and not _agree(found.success, claimed):
-        told = _shown(found.success.lower or Fraction(0))
-        yield _disagreement(f"the tree claims a success probability of {_shown(claimed)}; Storm finds {told}")
+@dataclass(frozen=True, slots=True)
+class _Looked:
+    """What was found by those who looked. Where facts are hidden, a tree that stops where the goal is not
+    true is no fault, but this is no success: its root succeeds at least as often as the tree claims to."""
+
+    own: Recomputed | None
+    storm: StormFigures | None
+    hidden: bool
+    worlds: Recomputed | None
+
+    @property
+    def success(self) -> tuple[Fraction, Fraction] | None:
+        """Bounds on the success probability, found by our own solver: equal but for what is hidden in more
+        worlds than are looked at."""
+        if self.worlds is not None:
+            return (self.worlds.success - self.worlds.without_goal,) * 2
+        if self.own is None:
+            return None
+        return self.own.success - (self.own.without_goal if self.hidden else 0), self.own.success
+
+
+def _problems(tree: Tree, looked: _Looked) -> Iterator[Diagnostic]:
+    claimed, own, found, worlds = tree.success_probability, looked.own, looked.storm, looked.worlds
+    if looked.success is not None and not looked.success[0] <= claimed <= looked.success[1]:
+        told = " or ".join(dict.fromkeys(_shown(bound) for bound in looked.success))
+        yield _disagreement(f"the tree claims a success probability of {_shown(claimed)}; it is {told}")
+    if found is not None:
+        least = found.success.lower or Fraction(0)
+        short = claimed - least > TOLERANCE if looked.hidden else not _agree(found.success, claimed)
+        if short:
+            yield _disagreement(
+                f"the tree claims a success probability of {_shown(claimed)}; Storm finds {_shown(least)}"
+            )
     if own is not None and found is not None:
         for name, answer in found.figures:
             if not _agree(answer, own.figure(name)):
                 yield _disagreement(f"the figure '{name}': our solver and Storm disagree")
+    if own is not None and worlds is not None:
+        for name in ("success", "failure", "blocked", "actions", "cost", "reward"):
+            if worlds.figure(name) != own.figure(name):
+                yield _disagreement(f"the figure '{name}' is another, world by world")
     yield from _contradictions(tree)
     if own is not None:
-        yield from _unsound(own)
+        yield from _unsound(own, looked.hidden)
 
 
 def _agree(answer: storm.Answer, value: Fraction | None) -> bool:
@@ -122,9 +159,9 @@ def _contradictions(tree: Tree) -> Iterator[Diagnostic]:
         )
 
 
-def _unsound(own: Recomputed) -> Sequence[Diagnostic]:
+def _unsound(own: Recomputed, hidden: bool) -> Sequence[Diagnostic]:
     found = []
-    if own.without_goal:
+    if own.without_goal and not hidden:
         found.append(
             f"with probability {_shown(own.without_goal)} the tree succeeds where the goal is not true"
         )

@@ -27,6 +27,8 @@ from bbtc.kleene import Truth
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, actions_of
 from bbtc.tree.validate import MAX_DEPTH, check_tree
+from tests.conftest import GOLDEN
+from tests.domains.problems import PROBLEMS, Problem
 from tests.strategies import HOSTILE_NAMES, soda_task, soda_tree, tasks, trees
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "docs" / "schemas"
@@ -165,6 +167,16 @@ def test_artefacts_match_their_schemas(tree: Tree) -> None:
     value = as_json(tree_to_json(tree))
     TREE_SCHEMA.validate(value)
     TASK_SCHEMA.validate(value["task"])
+
+
+@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+def test_artefacts_of_our_domains_match_their_schemas(problem: Problem) -> None:
+    task, tree = (
+        json.loads((GOLDEN / str(problem) / f"{kind}.json").read_text("utf-8")) for kind in ("task", "tree")
+    )
+    TASK_SCHEMA.validate(task)
+    TREE_SCHEMA.validate(tree)
+    TASK_SCHEMA.validate(tree["task"])
 
 
 def test_a_tree_that_carries_no_task_is_read_on_the_one_given() -> None:

@@ -73,6 +73,8 @@ CONSTRUCTS: dict[str, Callable[[Path], bool]] = {
     "fractions": _last(ast.Number, lambda node: "/" in node.text),
     "`probabilistic` in `:init`": _inside(ast.Init, _last(ast.Probabilistic)),
     "`oneof`": _last(ast.OneOf),
+    "`:observe`": _last(ast.Action, lambda node: node.observe is not None),
+    "noisy `:observe`": _last(ast.Observation, lambda node: isinstance(node.content, ast.Probabilistic)),
     "`:derived`": _last(ast.Derived),
     "action costs": _last(ast.FluentEffect, lambda node: node.fluent.name.key == "total-cost"),
     "cost of one outcome": _inside(

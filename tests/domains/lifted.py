@@ -16,6 +16,7 @@ from itertools import product
 from typing import Any, TypeAlias
 
 import numpy as np
+from typing_extensions import Self
 
 Form: TypeAlias = Any
 """A word, or a list of forms."""
@@ -91,7 +92,7 @@ class Lifted:
     _worlds: dict[State, World] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, text: str) -> Lifted:
+    def of(cls, text: str) -> Self:
         """Read a text."""
         self = cls()
         for head, *rest in (section for definition in forms(text) for section in definition[2:]):

@@ -17,9 +17,10 @@ from bbtc.cli.group import cli
 from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.pipeline import compile_sources, plan_task
+from bbtc.pipeline import compile_sources, plan_task, without_hidden
 from bbtc.planner.result import Plan
 from bbtc.syntax.reader import read_source
+from bbtc.tree.nodes import Tree
 from tests.sharing import shared
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -80,8 +81,17 @@ def _plan_of(problem: Problem, strategy: str) -> Plan:
         f"{problem.domain}-{problem.name}-{strategy}",
         lambda: plan_task(task, None, strategy, Limits(), lambda _: None),
     )
+    if task.components and plan.tree.task != task:  # asks about what is believed, too
+        assert plan.tree.task.variables[: len(task.variables)] == task.variables
+        return plan
     assert plan.tree.task == task
     return replace(plan, tree=replace(plan.tree, task=task))
+
+
+def seen_tree(problem: Problem) -> Tree:
+    """The tree of a problem's plan as exports have it: where facts are hidden, with a task for its runs that
+    hides nothing."""
+    return without_hidden(plan_of(problem).tree, Limits())
 
 
 # --- the command line ------------------------------------------------------------------------

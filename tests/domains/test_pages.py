@@ -20,7 +20,7 @@ from bbtc.limits import Limits
 from bbtc.tree.nodes import ConditionNode, ControlNode, Node, walk
 from tests.conftest import GOLDEN, Golden
 from tests.domains.constructs import users
-from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc, plan_of, task_of
+from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc, plan_of
 
 PAGES = REPOSITORY / "docs" / "domains"
 MADE = re.compile(r"(?<=<!-- )(?!end )(\w+)(?:: ([\w/-]+))? -->\n.*?(?=<!-- end -->)", re.DOTALL)
@@ -48,7 +48,8 @@ def fenced(text: str) -> str:
 
 def tree(problem: Problem) -> str:
     """The tree as an outline."""
-    return fenced(outline(task_of(problem), plan_of(problem).tree.root))
+    made = plan_of(problem).tree  # its task may have variables more, for what is believed
+    return fenced(outline(made.task, made.root))
 
 
 def plan(problem: Problem, anew: bool) -> str:

@@ -16,7 +16,7 @@ from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
 from bbtc.limits import Limits
 from bbtc.replay.script import TIMINGS, run_of, script_of
-from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.domains.problems import PROBLEMS, Problem, seen_tree
 from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.covering import within_budget
@@ -33,7 +33,7 @@ BUDGET = amount(500, 1_000_000)
 def test_every_scenario_runs_as_simulated(
     problem: Problem, name: EngineName, record_property: Callable[[str, object], None]
 ) -> None:
-    tree = plan_of(problem).tree
+    tree = seen_tree(problem)
     found = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits()), Limits()), MOST))
     assert found
     assert len(found) == MOST or sum(run.probability for run in found) == 1

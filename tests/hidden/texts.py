@@ -16,10 +16,20 @@ def _literal(atoms: list[str]) -> st.SearchStrategy[str]:
 def _condition(atoms: list[str]) -> st.SearchStrategy[str]:
     literal = _literal(atoms)
     several = st.lists(literal, min_size=2, max_size=2)
-    return st.one_of(
-        literal,
-        st.builds(lambda word, parts: f"({word} {' '.join(parts)})", st.sampled_from(["and", "or"]), several),
+    joined = st.builds(
+        lambda word, parts: f"({word} {' '.join(parts)})", st.sampled_from(["and", "or", "imply"]), several
     )
+    denied = st.builds(lambda part: f"(not {part})", joined)
+    return st.one_of(literal, literal, joined, joined, denied)
+
+
+@st.composite
+def _needs(draw: st.DrawFn, atoms: list[str]) -> str:
+    """A precondition: now and then it asks what is known."""
+    found = draw(_condition(atoms))
+    if draw(st.integers(0, 5)):
+        return found
+    return f"(and ({draw(st.sampled_from(['known', 'unknown']))} ({draw(st.sampled_from(HIDDEN))})) {found})"
 
 
 @st.composite
@@ -28,8 +38,10 @@ def _effect(draw: st.DrawFn) -> str:
     for _ in range(draw(st.integers(1, 2))):
         # A seen fact that reads a hidden one would be hidden: that happens, too, but seldom.
         target = draw(_literal(SEEN if draw(st.integers(0, 2)) else HIDDEN))
-        kind = draw(st.integers(0, 5))
-        if kind == 0:
+        kind = draw(st.integers(0, 6))
+        if kind == 3 and not draw(st.integers(0, 2)):
+            target = f"(unknown ({draw(st.sampled_from(HIDDEN))}))"
+        elif kind == 0:
             target = f"(when {draw(_condition([*HIDDEN, *SEEN]))} {target})"
         elif kind == 1:
             target = f"(probabilistic 1/3 {target})"
@@ -39,15 +51,21 @@ def _effect(draw: st.DrawFn) -> str:
     return f"(and {' '.join(parts)})"
 
 
+def _is_clause(condition: str) -> bool:
+    """Is it more than a literal, and not several of them?"""
+    return condition.startswith(("(or", "(imply", "(not (and", "(not (or", "(not (imply"))
+
+
 @st.composite
 def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
-    """A domain and a problem with up to three hidden facts and two seen ones."""
+    """A domain and a problem with up to three hidden facts and two seen ones. With ``noise``, some readings
+    may be wrong."""
     atoms = [*HIDDEN, *SEEN]
     actions = []
     for number in range(draw(st.integers(2, 5))):
         form = f"(:action a{number}"
         if draw(st.booleans()):
-            form += f" :precondition {draw(_condition(atoms))}"
+            form += f" :precondition {draw(_needs(atoms))}"
         kind = draw(st.integers(0, 3))
         if kind < 3:
             told = draw(_condition(HIDDEN)) if draw(st.booleans()) else f"({draw(st.sampled_from(atoms))})"
@@ -61,7 +79,7 @@ def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
     for atom in HIDDEN:
         kind = draw(st.integers(0, 3))
         init += [f"(unknown ({atom}))"] if kind < 2 else [f"({atom})"] if kind == 2 else []
-    kind = draw(st.integers(0, 3))
+    kind = draw(st.integers(0, 6))
     if kind == 1:
         init = [each for each in init if each[1] in "ust"]
         init.append(f"(oneof {' '.join(f'({atom})' for atom in HIDDEN)})")
@@ -71,6 +89,15 @@ def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
     elif kind == 3:
         init = [each for each in init if each != "(h)" and each != "(unknown (h))"]
         init.append("(probabilistic 1/4 (h))")
+    elif kind == 4:
+        init = [each for each in init if each[1] in "ust"]
+        init.append("(oneof (and (h) (i)) (and (i) (j)) (h))")
+    elif kind == 5:
+        init = [each for each in init if each[1] in "ust"]
+        init.append(f"(probabilistic 1/4 (h) 1/3 (i)) {draw(_condition(['i', 'j']).filter(_is_clause))}")
+    elif kind == 6:
+        init = [each for each in init if each[1] in "ust"]
+        init.append("(probabilistic 1/2 (h)) (probabilistic 1/3 (and (h) (j)) 1/3 (i)) (unknown (j))")
     goal = " ".join(draw(st.lists(_literal(atoms), min_size=1, max_size=2, unique_by=lambda each: each[-4:])))
     return (
         f"(define (domain d) (:predicates {' '.join(f'({atom})' for atom in atoms)})\n  "

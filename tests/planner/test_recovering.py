@@ -74,6 +74,8 @@ def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_trees_of_our_domains_recover(problem: Problem) -> None:
     of = task_of(problem)
+    if of.components:
+        pytest.skip("facts are hidden: nothing tells what the robot believes in other states (BBT0506)")
     if problem.domain in LARGE and problem.name != "after-the-alarm":
         pytest.skip("too many states for each")
     done = plan(of, "auto")

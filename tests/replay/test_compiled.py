@@ -14,7 +14,7 @@ from bbtc.belief.scenarios import scenarios
 from bbtc.limits import Limits
 from bbtc.replay.script import TIMINGS, run_of, script_of
 from bbtc.tree.nodes import Tree
-from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.domains.problems import PROBLEMS, Problem, seen_tree
 from tests.long_form import amount
 from tests.profiles import examples
 from tests.replay.compiled import CompiledReplay, CompiledStockReplay, require_library
@@ -58,7 +58,7 @@ def test_random_trees_run_as_in_the_reference(engine: type[CompiledReplay], latc
 @PROFILES
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_scenarios_run_as_simulated(problem: Problem, engine: type[CompiledReplay]) -> None:
-    tree = plan_of(problem).tree
+    tree = seen_tree(problem)
     runs = list(itertools.islice(scenarios(explore(tree.task, tree.root, Limits()), Limits()), MOST))
     with engine(tree) as replay:
         for scenario, timing in itertools.product(runs, TIMINGS):

@@ -14,6 +14,7 @@ from bbtc import pipeline
 from bbtc.backends.models.jani import jani, task_text
 from bbtc.backends.models.prism import prism, readable_names, tree_program
 from bbtc.diagnostics import BbtcError
+from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.tree.nodes import Tree
 from bbtc.verifier import storm, verdict
@@ -91,8 +92,8 @@ def test_a_verified_plan_is_written_and_a_wrong_one_is_not(
     out.unlink()
     honest = verdict.verify
 
-    def other(tree: Tree, limits: Limits, engine: verdict.Engine) -> verdict.Verdict:
-        return honest(replace(tree, success_probability=tree.success_probability / 2), limits, engine)
+    def other(tree: Tree, limits: Limits, engine: verdict.Engine, hidden: Task | None) -> verdict.Verdict:
+        return honest(replace(tree, success_probability=tree.success_probability / 2), limits, engine, hidden)
 
     monkeypatch.setattr("bbtc.verifier.verdict.verify", other)
     done = bbtc("plan", *FILES, "--strategy", "refine", "-q", "--verify", "-o", str(out))

@@ -11,6 +11,7 @@ from bbtc.cli.session import command as session_command
 
 if TYPE_CHECKING:
     from bbtc.tree.nodes import Tree
+    from bbtc.verifier.solve import Recomputed
     from bbtc.verifier.verdict import Engine, Verdict
 
 
@@ -71,6 +72,8 @@ def verdict_report(verdict: Verdict) -> list[str]:
     lines = [f"claimed   {exact(tree.success_probability)}"]
     if own is not None:
         lines.append(f"own       {exact(own.success)}, {counted(own.states, 'state')}")
+    if verdict.hidden and own is not None:
+        lines.append(f"worlds    {_worlds(verdict.worlds)}")
     if found is not None:
         low = found.success.lower
         how = "exactly" if found.exact else "within 1e-11"
@@ -86,3 +89,14 @@ def verdict_report(verdict: Verdict) -> list[str]:
             lines.append(f"reward    {expected(own.reward, None)}")
     lines.append("refused" if verdict.problems else "verified")
     return lines
+
+
+def _worlds(found: Recomputed | None) -> str:
+    """What the runs in each world came to."""
+    from bbtc.artefacts.numbers import exact
+    from bbtc.cli.counting import counted
+
+    if found is None:
+        return "too many to be looked at one by one"
+    mistaken = f", {exact(found.without_goal)} mistaken" if found.without_goal else ""
+    return f"{exact(found.success - found.without_goal)}{mistaken}, {counted(found.states, 'state')}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -64,13 +64,12 @@ class _Compiler:
         ]
         self._groups = Groups(self._hidden)
         self._draws = [draw for draw in found.draws if self._hidden.issuperset(draw.variables)]
-        clauses = (
+        clauses = [
             (given_true(clause.condition, found.start, found.uncertain), clause.span)
             for clause in found.clauses
-        )
-        self._clauses = [
-            (condition, span) for condition, span in clauses if self._hidden.issuperset(variables(condition))
         ]
+        self._clauses = [each for each in clauses if self._hidden.issuperset(variables(each[0]))]
+        self._check_what_does_not_matter(hidden - kept, clauses)
         for draw in self._draws:
             self._groups.join(draw.variables)
         for condition, _ in self._clauses:
@@ -98,6 +97,34 @@ class _Compiler:
             when = given_true(reading.when or TRUE, self._found.start, self._hidden)
             if when != FALSE:
                 yield replace(reading, when=None if when == TRUE else when)
+
+    def _check_what_does_not_matter(
+        self, left: Set[int], clauses: Sequence[tuple[Condition, Span | None]]
+    ) -> None:
+        """Report a contradiction of the start among facts that are left out, or are all given."""
+        for condition, span in clauses:
+            if condition == FALSE:
+                contradicted(self._report, span or self._model.init.span)
+                return
+        draws = [draw for draw in self._found.draws if not left.isdisjoint(draw.variables)]
+        others = [each for each in clauses if not left.isdisjoint(variables(each[0]))]
+        groups = Groups(left)
+        for together in (*(draw.variables for draw in draws), *(variables(each) for each, _ in others)):
+            groups.join(together)
+        by_group: dict[int, tuple[list[Draw], list[tuple[Condition, Span | None]]]] = {}
+        for draw in draws:
+            by_group.setdefault(groups.of(draw.variables[0]), ([], []))[0].append(draw)
+        for each in others:
+            by_group.setdefault(groups.of(next(variables(each[0]))), ([], []))[1].append(each)
+        for facts in groups.all():
+            mine, said = by_group.get(groups.of(facts[0]), ([], []))
+            worlds = Worlds(facts, {}, mine, [condition for condition, _ in said], self._limits)
+            try:
+                empty = worlds.contradict()
+            except TooManyWorlds:
+                continue
+            if empty:
+                contradicted(self._report, (said[0][1] if said else None) or self._model.init.span)
 
     def task(self) -> gt.Task:
         """The task whose conditions read knowledge."""

@@ -13,7 +13,7 @@ from bbtc.ground.lower import Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normal_form
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.refused import noise
-from bbtc.ground.start import Key, Prior
+from bbtc.ground.start import Key, Prior, contradicted
 from bbtc.ground.task_builder import TaskBuilder, reached_from
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -85,6 +85,10 @@ def physical(model: md.Model, report: Report, limits: Limits) -> Physical:
         for clause in begin.prior.clauses
         for part in conjuncts(normal_form(clause.condition))
     ]
+    for clause in clauses:
+        if clause.condition == FALSE:  # of facts that are given, or never true
+            contradicted(report, clause.span or model.init.span)
+            report.raise_errors()
     sensors = list(_sensed(builder.lowering, model.sensors, limits))
     for name, predicate in model.predicates.items():
         if predicate.observed:
@@ -119,7 +123,7 @@ def _told(
 ) -> list[tuple[Lowered, Fraction]]:
     """What is told, and how likely it is right: every part of a conjunction by itself."""
     if not isinstance(observed, me.Choice):
-        return [(lowering.condition(part, frame), Fraction(1)) for part in conjuncts(normal_form(observed))]
+        return [(lowering.condition(normal_form(part), frame), Fraction(1)) for part in conjuncts(observed)]
     noisy = noise(observed)
     assert noisy is not None  # others are refused
     fact, accuracy = noisy

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
@@ -75,6 +75,19 @@ class Worlds:
     def all(self) -> dict[int, Fraction]:
         """Every world, as a bit mask, with its probability; none where all contradict. Raises
         :class:`TooManyWorlds`."""
+        found: dict[int, Fraction] = {}
+        for world, weight in self._listed():
+            found[world] = found.get(world, Fraction(0)) + weight
+            if len(found) > MOST_WORLDS:
+                raise TooManyWorlds
+        whole = sum(found.values(), Fraction(0))
+        return {world: weight / whole for world, weight in sorted(found.items())}
+
+    def contradict(self) -> bool:
+        """Is there no world at all? Raises :class:`TooManyWorlds` where that is hard to tell."""
+        return next(self._listed(), None) is None
+
+    def _listed(self) -> Iterator[tuple[int, Fraction]]:
         alone = [place for place, (draws, clauses) in enumerate(self._of_fact) if not draws and not clauses]
         if 2 ** (len(alone) - len(self._given)) > MOST_WORLDS:
             raise TooManyWorlds
@@ -88,7 +101,6 @@ class Worlds:
             forced = self._forced(values, number) if stack else None
             if forced is None or not self._assign(values, active, forced):
                 stack = []
-        found: dict[int, Fraction] = {}
         steps = 0
         while stack:
             values, active = stack.pop()
@@ -99,19 +111,14 @@ class Worlds:
                 self._limits.check_time("listing worlds")
             choices = self._choices(values, active)
             if not choices:
-                world = sum(1 << place for place, value in enumerate(values) if value == Truth.TRUE)
                 weight = Fraction(1)
                 for ((part, _),) in active:
                     weight *= part
-                found[world] = found.get(world, Fraction(0)) + weight
-                if len(found) > MOST_WORLDS:
-                    raise TooManyWorlds
+                yield sum(1 << place for place, value in enumerate(values) if value == Truth.TRUE), weight
             for choice in choices:
                 after, left = bytearray(values), list(active)
                 if self._assign(after, left, choice):
                     stack.append((after, left))
-        whole = sum(found.values(), Fraction(0))
-        return {world: weight / whole for world, weight in sorted(found.items())}
 
     def _choices(self, values: bytearray, active: list[Branches]) -> list[list[tuple[int, bool]]]:
         """What may be the case of something that is open; nothing where all is settled."""

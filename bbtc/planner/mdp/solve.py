@@ -24,6 +24,9 @@ FEW_STATES = 100_000
 FEW_BELIEFS = 2_000
 """The same where there may be beliefs without end, whose weights have ever more digits."""
 
+_FEW_IN_ALL = FEW_BELIEFS // 2
+"""So many are looked at to see whether they end after all: then the least cost is known, too."""
+
 _SHARE = 1 / 3  # of the time, for the exploration of the whole space
 _BEFORE_VALUES = 1 / 2  # of the time, for exploration within a number of actions
 
@@ -104,8 +107,12 @@ def _seeing_all(task: Task, limits: Limits) -> Fraction:
 
 
 def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None:
-    """The least space, by the number of actions, in which a policy reaches the target; or all of it. None
-    where neither is within reach: with beliefs without end, P* may be what no policy attains."""
+    """All of a small space, or the least, by the number of actions, in which a policy reaches the target.
+    None where neither is within reach: with beliefs without end, P* may be what no policy attains."""
+    space = explore_space(task, replace(limits, states=min(limits.states, _FEW_IN_ALL)))
+    if space.complete:
+        found = max_prob(space, limits)
+        return Best(found, found.initial)
     few = replace(limits, states=min(limits.states, FEW_BELIEFS))
     for depth in count(1):
         space = explore_space(task, few, depth)
