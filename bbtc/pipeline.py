@@ -511,13 +511,13 @@ def verify_tree(tree: Tree, limits: Limits, engine: Engine = "auto") -> Verdict:
 
 
 def without_hidden(tree: Tree, limits: Limits) -> Tree:
-    """The tree with a task that does the same, but hides nothing (:mod:`bbtc.belief.lowered`). Raises
+    """The tree with a task that does the same, but hides nothing (:mod:`bbtc.belief.tree_task`). Raises
     ``LimitReached``."""
     if not tree.task.components:
         return tree
-    from bbtc.belief.lowered import lowered
+    from bbtc.belief.tree_task import tree_task
 
-    return replace(tree, task=lowered(tree.task, tree.root, limits))
+    return replace(tree, task=tree_task(tree.task, tree.root, limits))
 
 
 def with_monitor(tree: Tree, limits: Limits) -> Tree | None:

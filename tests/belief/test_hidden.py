@@ -11,9 +11,9 @@ import pytest
 import bbtc
 from bbtc.artefacts.task_json import task_from_json, task_to_json
 from bbtc.belief.hidden import belief_in
-from bbtc.belief.lowered import lowered
 from bbtc.belief.simulate import simulate
 from bbtc.belief.state import compile_action, initial_belief
+from bbtc.belief.tree_task import tree_task
 from bbtc.ground.condition import And, Is
 from bbtc.ground.task import Observation, Task
 from bbtc.kleene import Truth
@@ -93,9 +93,9 @@ def test_looking_until_it_is_known(places: int, strategy: str) -> None:
 
 
 @pytest.mark.parametrize("task", [tiger(ACCURACY, Fraction(99, 100)), search(3)])
-def test_a_tree_cannot_tell_the_lowered_task_from_its_own(task: Task) -> None:
+def test_a_tree_cannot_tell_the_task_made_for_it_from_its_own(task: Task) -> None:
     plan = bbtc.plan(task, target=Fraction(1, 2))
-    low = lowered(task, plan.tree.root, LIMITS)
+    low = tree_task(task, plan.tree.root, LIMITS)
     assert low.components == ()
     assert not any(action.changes for action in low.actions)
     own, other = (simulate(each, plan.tree.root, LIMITS) for each in (task, low))

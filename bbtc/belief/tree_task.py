@@ -35,7 +35,7 @@ from bbtc.tree.nodes import Node
 _NAME = "belief"
 
 
-def lowered(task: Task, root: Node, limits: Limits) -> Task:
+def tree_task(task: Task, root: Node, limits: Limits) -> Task:
     """The task for the runs of one tree: with its actions, and nothing hidden. Raises
     :class:`bbtc.diagnostics.LimitReached`."""
     if not task.components:
@@ -58,7 +58,7 @@ def lowered(task: Task, root: Node, limits: Limits) -> Task:
 @dataclass(frozen=True, slots=True)
 class _Code:
     """What is believed of a component, by number, as bits: the values of ``variables``, which stand in the
-    lowered task from ``first`` on."""
+    task of the tree from ``first`` on."""
 
     by_number: Mapping[int, int]
     first: int
@@ -93,7 +93,7 @@ def _codes(task: Task, chain: Chain) -> list[_Code]:
 
 
 def _coded(task: Task, codes: Sequence[_Code], values: Values) -> Values:
-    """The values of a state in the lowered task."""
+    """The values of a state in the task of the tree."""
     found = values[: len(task.variables)]
     for component, code in enumerate(codes):
         found += bytes(value for _, value in code.sets(number_in(task, values, component)))
