@@ -201,3 +201,12 @@ def test_a_guess_is_allowed_where_hidden_facts_could_be_done_without() -> None:
     assert bbtc.bounds(text, allow_guess=True).upper == Fraction(1, 2)
     plan = bbtc.plan(text, target=Fraction(1, 2), allow_guess=True)
     assert plan.tree.success_probability == plan.figures.mistaken == Fraction(1, 2)
+
+
+@pytest.mark.parametrize(("looks", "best"), [(2, "0.85"), (3, "0.93925"), (5, "0.973388125")])
+def test_within_some_actions_the_majority_of_readings_counts(looks: int, best: str) -> None:
+    plan = bbtc.plan(tiger(ACCURACY), target=Fraction(best), max_actions=looks + 1)
+    assert plan.tree.success_probability == Fraction(best)
+    added = {v.predicate for v in plan.tree.task.variables if v.predicate.startswith("believed-")}
+    assert added == {"believed-tiger"}
+    assert bbtc.verify(plan).problems == ()

@@ -79,9 +79,9 @@ def _thresholds(
 ) -> Iterator[tuple[Variable, Condition, Fraction]]:
     """Thresholds that tell pairs apart: what the condition is called, the condition, and the threshold."""
     beliefs, waiting = beliefs_of(component), list(pairs)
-    named: dict[Condition, Variable] = {
-        each.condition: task.variables[each.variable] for each in component.known
-    }
+    # What is known of a condition names it, rather than what was believed of it before.
+    surest = sorted(component.known, key=lambda each: each.at_least)
+    named = {each.condition: task.variables[each.variable] for each in surest}
     for place, fact in enumerate(component.facts):
         named.setdefault(Is(place, Truth.TRUE), Variable(*split_name(fact), three_valued=True))
     for condition, name in named.items():

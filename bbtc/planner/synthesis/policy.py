@@ -168,6 +168,10 @@ class _Search:
         self.bounds, self.stop, self.horizon = best.bounds, best.stop, best.horizon
         horizon = best.horizon
         parts = phases(horizon, self.limits)
+        for part in parts:
+            self.wider = with_beliefs(self.task, part.policy)
+            if self.wider is not None:
+                return
         done = False
         if len(parts) == 1:
             root = synthesize(self.task, parts[0].policy, self.limits)
