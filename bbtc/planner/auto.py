@@ -55,6 +55,7 @@ from bbtc.planner.result import Plan, Progress, Refinement
 from bbtc.planner.strong_cyclic.plan import plan_strong_cyclic, sure_starts
 from bbtc.planner.synthesis.policy import plan_policy
 from bbtc.rewrite.repeat import with_repeats
+from bbtc.rewrite.simplify import size
 from bbtc.tree.nodes import Node
 
 MANY_ACTIONS = 500
@@ -312,6 +313,7 @@ class _Auto:
 
     def add_tree(self, root: Node, recovers: Recovering | None = None) -> None:
         """Take a tree into account. Raises ``LimitReached``."""
+        self.limits.check_nodes(size(root))
         chain = explore(self.task, root, replace(self.limits, states=min(self.limits.states, _REFINE_STATES)))
         best = BestTree(self.task, self.target, outer=self.options.best)
         best.take(root, chain, success_of(chain))

@@ -291,7 +291,7 @@ def forgetful(node: Node) -> Node:
     match node:
         case ActionNode():
             return replace(node, latched=False, guarded=True)
-        case ControlNode(kind="retry"):
+        case ControlNode(kind="retry" | "retry-until-success"):
             return forgetful(node.children[0])
         case ControlNode():
             return replace(node, children=tuple(map(forgetful, node.children)))

@@ -151,7 +151,7 @@ def test_the_trees_of_the_domains_are_verified(path: Path) -> None:
 
 
 def codes(tree: Tree) -> list[str]:
-    return [problem.code for problem in verify(tree, Limits(), "own").problems]
+    return [problem.code for problem in verify_tree(tree, Limits(), "own").problems]
 
 
 def test_a_claim_that_is_a_little_too_high_is_refused() -> None:

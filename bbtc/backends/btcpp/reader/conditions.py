@@ -82,6 +82,7 @@ class ConditionReader(Generic[S]):
         self._count()
         self._unread.took(element)
         if level > DEEPEST_CONDITION:
+            self._unread.took(element, *element.attributes)  # what is too deep is not looked at any further
             message = f"a condition has at most {DEEPEST_CONDITION} levels"
             raise unreadable(self._document, element, "BBT0605", message)
         register = match(REGISTER, element)
