@@ -81,10 +81,12 @@ def simplified(
             smaller = _without_idle(found, _returned(task, found, own, limits))
         else:
             smaller = _without_idle(found, may_return(task, found))
-        shared = _shared(task, smaller, chain, limits, closed_world=closed_world)
-        if shared is None:
+        found = smaller
+        # What nodes may return takes as long as many merges: it is worked out once none is left.
+        while (shared := _shared(task, found, chain, limits, closed_world=closed_world)) is not None:
+            found = shared
+        if found is smaller:
             break
-        found = shared
     if not same_runs(task, chain, smaller):
         raise AssertionError("a simplification changed what a tree does")
     return smaller
