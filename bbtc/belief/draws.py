@@ -21,6 +21,13 @@ Draw: TypeAlias = tuple[Delta, Fraction, Fraction]
 """What is set, what is added to the cost, and the reward."""
 Spend: TypeAlias = Callable[[int, int], None]
 """Told how many combinations were formed, and how many of them differ; ends it at a limit."""
+
+
+def unbounded(work: int, found: int) -> None:
+    """A :data:`Spend` that ends nothing."""
+    del work, found
+
+
 Drawer: TypeAlias = Callable[[Values], dict[Draw, Fraction]]
 _Amounts: TypeAlias = Callable[[Values], tuple[Fraction, Fraction]]  # cost, reward
 

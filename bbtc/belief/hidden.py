@@ -14,16 +14,25 @@ from fractions import Fraction
 from math import gcd, lcm
 from typing import NamedTuple, TypeAlias
 
-from bbtc.belief.draws import PLACES, Delta, Draw, Drawer, Spend, Values, compile_factor, product_of
+from bbtc.belief.draws import (
+    PLACES,
+    Delta,
+    Draw,
+    Drawer,
+    Spend,
+    Values,
+    compile_factor,
+    product_of,
+    unbounded,
+)
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import (
     TRUE,
     Condition,
     Constant,
-    Is,
-    Known,
     compile_condition,
     evaluate,
+    is_test,
     leaves,
     replaced,
     variables,
@@ -161,10 +170,8 @@ def told_first(task: Task, values: Values) -> Iterator[tuple[Values, Fraction]]:
     for index, component in enumerate(task.components):
         number = beliefs_of(component).prior
         values += number.to_bytes(PLACES, "big")
-        drawers.append(
-            compile_change(task, Change(index, component.seen, (), component.first), lambda work, found: None)
-        )
-    for (delta, _, _), probability in product_of(values, drawers, lambda work, found: None).items():
+        drawers.append(compile_change(task, Change(index, component.seen, (), component.first), unbounded))
+    for (delta, _, _), probability in product_of(values, drawers, unbounded).items():
         after = bytearray(values)
         for place, value in delta:
             after[place] = value
@@ -176,7 +183,9 @@ def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
     facts has the value that it has in the world. ``(known …)`` and ``(unknown …)`` ask what is known there,
     too."""
     read = set(variables(condition))
-    told = {leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if _asks(leaf)}
+    told = {
+        leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if is_test(leaf)
+    }
     condition = replaced(condition, lambda leaf: told.get(leaf, leaf))
     worlds: dict[bytes, Fraction] = {bytes(values): ONE}
     for index, component in enumerate(task.components):
@@ -189,10 +198,6 @@ def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
                 for sets, p in drawn.items()
             )
     return sum((p for world, p in worlds.items() if evaluate(condition, world) is Truth.TRUE), ZERO)
-
-
-def _asks(leaf: Is | Known) -> bool:
-    return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
 
 
 def _drawn(task: Task, values: Values, index: int, known: Sequence[Knowledge]) -> dict[Delta, Fraction]:
@@ -223,6 +228,12 @@ _Told: TypeAlias = tuple[tuple[int, int], ...]
 the numbers of the observations with what they told."""
 
 
+def case_of(task: Task, change: Change, values: Values) -> tuple[int, bytes]:
+    """What decides over a change in a state: the number of what is believed, and the values of the variables
+    that are seen."""
+    return number_in(task, values, change.component), bytes(values[variable] for variable in change.seen)
+
+
 def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
     """A change of hidden facts as a function from the values of a state to what may come of it: what is
     believed and known then, and the seen variables that it sets. Costs and rewards that the robot cannot see
@@ -232,11 +243,10 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
     cache: dict[tuple[int, bytes], dict[Draw, Fraction]] = {}
 
     def draw(values: Values) -> dict[Draw, Fraction]:
-        number = number_in(task, values, change.component)
-        seen = bytes(values[variable] for variable in change.seen)
-        found = cache.get((number, seen))
+        case = case_of(task, change, values)
+        found = cache.get(case)
         if found is None:
-            found = cache[number, seen] = results(number, seen)
+            found = cache[case] = results(*case)
         return found
 
     def results(number: int, seen: bytes) -> dict[Draw, Fraction]:

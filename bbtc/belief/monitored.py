@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from bbtc.belief.chain import Chain, explore
-from bbtc.belief.draws import Values
-from bbtc.belief.hidden import Reading, Readings, beliefs_of, number_in
+from bbtc.belief.draws import Values, unbounded
+from bbtc.belief.hidden import Reading, Readings, beliefs_of, case_of, number_in
 from bbtc.belief.state import initial_belief
 from bbtc.ground.condition import Condition, replaced, variables
 from bbtc.ground.describe import describe
@@ -157,16 +157,13 @@ class _Tables:
         return self._rows(FIRST, change, starts, numbers)
 
     def _move(self, action: str, change: Change, states: Iterable[Values], numbers: dict[int, int]) -> Move:
-        asked = (
-            (number_in(self._task, values, change.component), bytes(values[at] for at in change.seen))
-            for values in states
-        )
+        asked = (case_of(self._task, change, values) for values in states)
         return self._rows(action, change, asked, numbers)
 
     def _rows(
         self, action: str, change: Change, asked: Iterable[tuple[int, bytes]], numbers: dict[int, int]
     ) -> Move:
-        readings = Readings(self._task, change, lambda work, found: None)
+        readings = Readings(self._task, change, unbounded)
         rows: list[Row] = []
         for number, seen in dict.fromkeys(asked):
             self._limits.check_time("writing down what is known")

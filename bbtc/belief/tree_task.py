@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bbtc.belief.chain import Chain, explore
-from bbtc.belief.draws import PLACES, Draw, Values
-from bbtc.belief.hidden import compile_change, number_in, place_of
+from bbtc.belief.draws import PLACES, Draw, Values, unbounded
+from bbtc.belief.hidden import case_of, compile_change, number_in, place_of
 from bbtc.ground.condition import TRUE, Condition, Is, conjunction
 from bbtc.ground.task import (
     NO_CHANGE,
@@ -26,6 +26,7 @@ from bbtc.ground.task import (
     Outcome,
     Task,
     Variable,
+    unused_name,
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -76,9 +77,7 @@ class _Code:
 def _codes(task: Task, chain: Chain) -> list[_Code]:
     """Codes for all beliefs that a chain has. They do not depend on the numbers of beliefs, but on the order
     of the chain."""
-    name = _NAME
-    while any(variable.predicate == name for variable in task.variables):
-        name += "-"
+    name = unused_name(_NAME, {variable.predicate for variable in task.variables})
     codes: list[_Code] = []
     first = len(task.variables)
     for component in range(len(task.components)):
@@ -123,18 +122,17 @@ class _Tables:
     def _factors(self, change: Change, states: Iterable[Values]) -> Iterator[Factor]:
         """One factor for all that is certain, and one for each belief, and what is seen, that leaves open
         what will be told."""
-        draw = compile_change(self._task, change, lambda work, found: None)
+        draw = compile_change(self._task, change, unbounded)
         code = self._codes[change.component]
         certain: list[Effect] = []
         charges: list[Charge] = []
         done: set[tuple[int, bytes]] = set()
         for values in states:
             self._limits.check_time("writing down what is believed")
-            number = number_in(self._task, values, change.component)
-            seen = bytes(values[variable] for variable in change.seen)
-            if (number, seen) in done:
+            case = number, seen = case_of(self._task, change, values)
+            if case in done:
                 continue
-            done.add((number, seen))
+            done.add(case)
             sees = ((variable, Truth(value)) for variable, value in zip(change.seen, seen, strict=True))
             when = conjunction(Is(variable, value) for variable, value in (*code.sets(number), *sees))
             drawn = draw(values)

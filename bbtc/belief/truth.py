@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
 
-from bbtc.belief.draws import Values
-from bbtc.belief.hidden import Readings, belief_in, number_in
+from bbtc.belief.draws import Values, unbounded
+from bbtc.belief.hidden import Readings, belief_in, case_of, number_in
 from bbtc.ground.task import ONE, Change, Task
 from bbtc.markov import distribution
 
@@ -46,7 +46,7 @@ class HiddenTruth:
             fits = sum(option.probability for option in self._options(action, change, values, worlds, after))
             known = sum(
                 reading.probability
-                for reading in self._of(action, change).after(*self._before(change, values))
+                for reading in self._of(action, change).after(*case_of(self.task, change, values))
                 if self._same(change, values, after, reading.shown, reading.belief)
             )
             if not known:
@@ -98,19 +98,17 @@ class HiddenTruth:
         world = worlds[change.component]
         return [
             _Option(then, probability)
-            for shown, belief, then, probability in readings.in_world(*self._before(change, values), world)
+            for shown, belief, then, probability in readings.in_world(
+                *case_of(self.task, change, values), world
+            )
             if self._same(change, values, after, shown, belief)
         ]
 
     def _of(self, action: str, change: Change) -> Readings:
         key = action, change.component
         if key not in self._readings:
-            self._readings[key] = Readings(self.task, change, lambda work, found: None)
+            self._readings[key] = Readings(self.task, change, unbounded)
         return self._readings[key]
-
-    def _before(self, change: Change, values: Values) -> tuple[int, bytes]:
-        seen = bytes(values[variable] for variable in change.seen)
-        return number_in(self.task, values, change.component), seen
 
     def _same(
         self, change: Change, values: Values, after: Values, shown: Sequence[tuple[int, int]], belief: int

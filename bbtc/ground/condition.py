@@ -160,6 +160,11 @@ def variables(condition: Condition) -> Iterator[int]:
     return (leaf.variable for leaf in leaves(condition))
 
 
+def is_test(leaf: Is | Known) -> bool:
+    """Does it ask what is known of a variable, and not what it is?"""
+    return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
+
+
 def replaced(condition: Condition, leaf: Callable[[Is | Known], Condition]) -> Condition:
     """The condition in negation normal form, without constants and repeats, with other leaves."""
     match condition:

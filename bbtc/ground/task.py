@@ -6,7 +6,7 @@ and costs are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -28,6 +28,13 @@ def split_name(name: str) -> tuple[str, tuple[str, ...]]:
     symbol, _, rest = name.partition("(")
     inner = rest.removesuffix(")")
     return symbol, tuple(inner.split(",")) if inner else ()
+
+
+def unused_name(name: str, taken: Collection[str]) -> str:
+    """The name, made longer if it is taken."""
+    while name in taken:
+        name += "-"
+    return name
 
 
 @dataclass(frozen=True, slots=True)

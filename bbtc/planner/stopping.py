@@ -22,6 +22,7 @@ from bbtc.ground.condition import (
     Known,
     conjunction,
     conjuncts,
+    is_test,
     leaves,
     negation,
     replaced,
@@ -38,6 +39,7 @@ from bbtc.ground.task import (
     Outcome,
     Task,
     Variable,
+    unused_name,
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -76,9 +78,9 @@ class Stopping:
             return None
         predicates = {variable.predicate for variable in task.variables}
         schemas = {action.schema for action in task.actions}
-        stop = _unused("stop", schemas)
-        done = Variable(_unused("stopped", predicates), (), three_valued=False)
-        true = _unused("true", predicates)
+        stop = unused_name("stop", schemas)
+        done = Variable(unused_name("stopped", predicates), (), three_valued=False)
+        true = unused_name("true", predicates)
         reached = [Variable(true, (str(index + 1),), three_valued=False) for index in parts]
         first = len(task.variables)
         going = Is(first, Truth.FALSE)
@@ -159,7 +161,9 @@ def _by_component(task: Task) -> tuple[dict[int, list[Condition]], list[Conditio
     parts: dict[int, list[Condition]] = {}
     seen: list[Condition] = []
     for part in conjuncts(task.goal):
-        found = {owner[leaf.variable] for leaf in leaves(part) if leaf.variable in owner and not _asks(leaf)}
+        found = {
+            owner[leaf.variable] for leaf in leaves(part) if leaf.variable in owner and not is_test(leaf)
+        }
         if len(found) > 1:
             refuse_hidden(task, "stopped at, where a part of the goal joins facts that are apart")
         if found:
@@ -169,34 +173,22 @@ def _by_component(task: Task) -> tuple[dict[int, list[Condition]], list[Conditio
     return parts, seen
 
 
-def _asks(leaf: Is | Known) -> bool:
-    """Does it ask what is known?"""
-    return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
-
-
 def _shown(task: Task, index: int, parts: Iterable[Condition], reached: int) -> Change:
     """The robot sees whether some parts of the goal are true."""
     component = task.components[index]
     condition = conjunction(parts)
     known = {each.variable: each.condition for each in component.known}
     others = sorted(
-        {leaf.variable for leaf in leaves(condition) if leaf.variable not in known or _asks(leaf)}
+        {leaf.variable for leaf in leaves(condition) if leaf.variable not in known or is_test(leaf)}
     )
     seen = (*others, reached)
     local = {variable: len(component.facts) + place for place, variable in enumerate(seen)}
 
     def leaf(each: Is | Known) -> Condition:
-        if each.variable in known and isinstance(each, Is) and not _asks(each):
+        if each.variable in known and isinstance(each, Is) and not is_test(each):
             inner = known[each.variable]
             return inner if each.value is Truth.TRUE else negation(inner)
         return replace(each, variable=local[each.variable])
 
     true = Effect(replaced(condition, leaf), ((local[reached], Truth.TRUE),))
     return Change(index, seen, (Factor((Outcome(ONE, (true,)),)),))
-
-
-def _unused(name: str, names: Iterable[str]) -> str:
-    taken = set(names)
-    while name in taken:
-        name += "-"
-    return name

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from bbtc.belief.draws import Values
+from bbtc.belief.draws import Values, unbounded
 from bbtc.belief.hidden import Readings, beliefs_of, number_in
 from bbtc.belief.monitored import ObservationNames, changes_of, with_hidden
 from bbtc.belief.scenarios import Scenario
@@ -64,7 +64,7 @@ class Tellings:
             number = number_in(self._task, before, component)
         key = action, component
         if key not in self._readings:
-            self._readings[key] = Readings(self._task, change, lambda work, found: None)
+            self._readings[key] = Readings(self._task, change, unbounded)
         seen = bytes(before[variable] for variable in change.seen)
         for reading in self._readings[key].after(number, seen):
             then = bytearray(seen)

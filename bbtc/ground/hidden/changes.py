@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from bbtc.ground import task as gt
-from bbtc.ground.condition import FALSE, TRUE, Condition, Is, Known, conjuncts, replaced, variables
+from bbtc.ground.condition import FALSE, TRUE, Condition, Is, Known, conjuncts, is_test, replaced, variables
 from bbtc.ground.effects import arrange
 from bbtc.ground.hidden.groups import Groups
 from bbtc.ground.hidden.parts import (
@@ -18,7 +18,6 @@ from bbtc.ground.hidden.parts import (
     effects_of,
     facts_of,
     facts_read,
-    is_test,
     only,
     parts_of,
 )

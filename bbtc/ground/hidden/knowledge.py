@@ -25,12 +25,13 @@ from bbtc.ground.condition import (
     Or,
     conjunction,
     disjunction,
+    is_test,
     leaves,
     negation,
     replaced,
 )
 from bbtc.ground.hidden.groups import Groups
-from bbtc.ground.hidden.parts import facts_read, is_test
+from bbtc.ground.hidden.parts import facts_read
 from bbtc.kleene import Truth
 
 _MOST_CASES = 8

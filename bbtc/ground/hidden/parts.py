@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from bbtc.ground import task as gt
-from bbtc.ground.condition import TRUE, Condition, Is, Known, disjunction, leaves
+from bbtc.ground.condition import TRUE, Condition, disjunction, is_test, leaves
 from bbtc.ground.effects import merge_outcomes
 from bbtc.kleene import Truth
 
@@ -88,11 +88,6 @@ def facts_read(condition: Condition | None) -> set[int]:
 def tests_read(condition: Condition | None) -> set[int]:
     """The variables of which a condition asks whether they are known."""
     return set() if condition is None else {leaf.variable for leaf in leaves(condition) if is_test(leaf)}
-
-
-def is_test(leaf: Is | Known) -> bool:
-    """Is it about what is known?"""
-    return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
 
 
 def all_settings(factors: Iterable[gt.Factor]) -> Iterator[Setting]:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from itertools import product
 from math import prod
 
-from bbtc.ground.condition import TRUE, Condition, Is, Known, negation, replaced, variables
+from bbtc.ground.condition import TRUE, Condition, Is, Known, is_test, negation, replaced, variables
 from bbtc.ground.renumber import Renumbering
 from bbtc.ground.task import (
     ONE,
@@ -97,9 +97,9 @@ class _Seeing:
         true = self._known.get(leaf.variable)
         if true is None:
             return leaf
-        if true is TRUE or isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN:
+        if true is TRUE or is_test(leaf):
             return TRUE
-        return true if leaf.value is Truth.TRUE else negation(true)
+        return true if leaf == Is(leaf.variable, Truth.TRUE) else negation(true)
 
     def _action(self, action: GroundAction) -> GroundAction:
         factors = (*action.factors, *(each for change in action.changes for each in self._factors(change)))
