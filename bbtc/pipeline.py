@@ -429,7 +429,7 @@ def plan_task(
     from bbtc.belief.chain import explore
     from bbtc.belief.soundness import violations
     from bbtc.planner.best_tree import BestTree
-    from bbtc.planner.bounds import judged
+    from bbtc.planner.bounds import judged, unjudged
     from bbtc.planner.guard import guarded
     from bbtc.planner.options import DEFAULTS
     from bbtc.planner.strategies import run_strategy
@@ -459,7 +459,7 @@ def plan_task(
         search_ends()
         if plan is None and best.empty:
             raise
-        plan = plan or best.plan("limit-reached", reached.diagnostics[0])
+        plan = unjudged(plan or best.plan("limit-reached", reached.diagnostics[0]))
     except KeyboardInterrupt:
         search_ends()
         plan = plan or best.plan("interrupted")

@@ -130,3 +130,12 @@ def judged(plan: Plan, limits: Limits, options: Options = DEFAULTS) -> Plan:
     if interrupted:
         status = "interrupted"
     return replace(plan, tree=replace(tree, status=status, bounds=(lower, upper)))
+
+
+def unjudged(plan: Plan) -> Plan:
+    """The plan with the bounds that hold without looking, where a limit ended planning before it had any:
+    what the tree does itself, and 1."""
+    tree = plan.tree
+    if tree.status != "limit-reached" or tree.bounds is not None:
+        return plan
+    return replace(plan, tree=replace(tree, bounds=(tree.success_probability, Fraction(1))))

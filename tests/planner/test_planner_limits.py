@@ -15,7 +15,7 @@ import pytest
 
 from bbtc.diagnostics import Report
 from bbtc.ground.task import Task
-from bbtc.limits import Limits
+from bbtc.limits import Effort, Limits
 from bbtc.pipeline import compile_sources, plan_task
 from bbtc.planner.bounds import task_value
 from bbtc.planner.mdp.explore import explore_space
@@ -125,6 +125,20 @@ def test_a_limit_on_nodes_is_never_passed(row: Task, strategy: str) -> None:
     limits = Limits(nodes=150, states=3000, seconds=5)
     tree = plan_task(row, None, strategy, limits, lambda _: None).tree
     assert sum(1 for _ in walk(tree.root)) <= limits.nodes
+
+
+@pytest.mark.parametrize("strategy", ["refine", "policy", "search", "strong-cyclic", "auto"])
+def test_bounds_are_told_wherever_a_limit_ends_planning(strategy: str) -> None:
+    """The limit is met at the first look at it, at the second, and so on until planning ends by itself."""
+    task = compile_sources([SourceFile("coins.pddl", coins(3))], Report(), Limits())
+    for looks in range(100):
+        limits = Limits(effort=Effort(looks))
+        tree = plan_task(task, Fraction(999, 1000), strategy, limits, lambda _: None).tree
+        assert tree.bounds is not None, looks
+        assert tree.bounds[0] <= Fraction(3, 4) ** 3 <= tree.bounds[1], looks
+        if tree.status != "limit-reached":
+            return
+    raise AssertionError("planning did not end")
 
 
 # --- memory ----------------------------------------------------------------------------------
