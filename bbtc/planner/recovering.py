@@ -3,8 +3,9 @@
 1. All states that any actions lead to are explored, and what one change
    (:mod:`bbtc.planner.changing_facts`) and any actions make of some of them.
 2. P* and the least cost V are found for all of them.
-3. A state that runs visit may take the choices that attain V, as in :mod:`bbtc.planner.synthesis.permissive`;
-   any other one those that attain P* and cost little more, since that costs the runs nothing.
+3. A state that runs visit may take the choices that attain V, as in :mod:`bbtc.planner.synthesis.permissive`,
+   and of these the ones that others' changes harm least (:mod:`bbtc.planner.exposure`); any other one those
+   that attain P* and cost little more, since that costs the runs nothing.
 4. Rules are learnt one by one, as in :mod:`bbtc.planner.synthesis.rules`, but for their guards: an action
    reads its precondition by itself, so a rule tells apart only states in which that is not false, and most
    rules need no test at all. What a rule decides must leave a way to the goal from everywhere; choices that
@@ -42,6 +43,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.planner.elsewhere import MOST_VISITED, also_at, changed, spread
+from bbtc.planner.exposure import least_exposed
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.graph import draw_probabilities, sums
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
@@ -84,9 +86,10 @@ class Recovering:
 def recovering_tree(task: Task, limits: Limits, *, everywhere: bool = False) -> Recovering | None:
     """A tree that does what it can from anywhere; None where costs are not known. Raises ``LimitReached``,
     and with ``everywhere`` also where not all states are looked at."""
-    space, all_of_them = _wide_space(task, limits, everywhere=everywhere)
+    facts = ChangingFacts.of(task, limits)
+    space, all_of_them = _wide_space(task, facts, limits, everywhere=everywhere)
     found = max_prob(space, limits)
-    choices = _choices(found, limits)
+    choices = _choices(found, facts, limits)
     if choices is None:
         return None
     trees = []
@@ -98,12 +101,13 @@ def recovering_tree(task: Task, limits: Limits, *, everywhere: bool = False) -> 
     return Recovering(min(trees, key=size), found.initial, all_of_them)
 
 
-def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateSpace, bool]:
+def _wide_space(
+    task: Task, facts: ChangingFacts, limits: Limits, *, everywhere: bool
+) -> tuple[StateSpace, bool]:
     """All that any actions lead to, also behind the goal and from where others may leave some states, all of
     them if they are few; is that everything? Choices of goal states are left out. Raises ``LimitReached``."""
     endless = replace(task, goal=FALSE)
     space = _whole(endless, limits)
-    facts = ChangingFacts.of(task, limits)
     own = initial_belief(task)
     wider, all_of_them = endless, False
     looked_at: set[Values] = set()
@@ -155,15 +159,15 @@ def _whole(task: Task, limits: Limits) -> StateSpace:
 
 @dataclass(frozen=True, slots=True)
 class _Choices:
-    """Choices that attain the least cost (``best``), all that are ``near`` enough elsewhere, and of these the
-    ones after which the expected cost falls."""
+    """Choices that attain the least cost, of these the ones least exposed to changes (``best``), all that are
+    ``near`` enough elsewhere, and of these the ones after which the expected cost falls."""
 
     best: Flags
     near: Flags
     falling: Flags
 
 
-def _choices(found: MaxProb, limits: Limits) -> _Choices | None:
+def _choices(found: MaxProb, facts: ChangingFacts, limits: Limits) -> _Choices | None:
     cheapest = least_cost(found, limits)
     if cheapest is None:
         return None
@@ -186,6 +190,7 @@ def _choices(found: MaxProb, limits: Limits) -> _Choices | None:
     onward = sums(space.edge_choice, weight * cheapest.values[space.edge_successor], count)
     values = cheapest.values[space.choice_state]
     more = own + onward - values - _CLOSE * (1 + values)
+    best = least_exposed(found, best, facts, limits)
     return _Choices(best, found.best & (more <= _NEAR * own), found.best & (more <= _FALLING * own))
 
 
