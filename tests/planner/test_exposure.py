@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
-from itertools import permutations, product
+from itertools import product
 from math import prod
-from random import Random
 
 import numpy as np
 from hypothesis import given
@@ -23,6 +22,7 @@ from bbtc.planner.recovering import recovering_tree
 from bbtc.tree.nodes import Node
 from tests.disturbance.reference import Exact, State, best_chances, outcomes_in
 from tests.long_form import amount
+from tests.planner.errands import errands
 from tests.planner.journeys import journeys
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
@@ -65,30 +65,8 @@ def stops(of: Task) -> list[str]:
     return found
 
 
-def errands(seed: int) -> Task:
-    """Something is to be got at two places, in any order, and brought home; ways have doors, which nobody
-    opens or closes, and some places are slippery."""
-    drawn = Random(seed)
-    home, doors, things = 0, [4, 5], [6, 7]
-    acts = []
-    for here, there in permutations(range(4), 2):
-        if drawn.random() < 0.7:
-            needs = [Is(here, T), *(Is(door, T) for door in doors if drawn.random() < 0.25)]
-            ways = [("1", {here: F, there: T})]
-            if drawn.random() < 0.2:
-                ways = [("3/4", {here: F, there: T}), ("1/4", {here: F, home: T} if here != home else {})]
-            acts.append(action(f"go-{here}-{there}", conjunction(needs), *ways))
-    for thing, place in zip(things, drawn.sample(range(1, 4), 2), strict=True):
-        sure = drawn.choice(["1", "1/2"])
-        ways = [(sure, {thing: T}), *([] if sure == "1" else [("1/2", {})])]
-        acts.append(action(f"get-{thing}", conjunction([Is(place, T), Is(thing, F)]), *ways))
-    goal = conjunction([Is(home, T), *(Is(thing, T) for thing in things)])
-    made = task("home p1 p2 p3 d1 d2 t1 t2", {home: T, 4: T, 5: T}, goal, *acts)
-    return replace(made, variables=tuple(replace(each, three_valued=False) for each in made.variables))
-
-
 @examples(amount(60, 3000))
-@given(of=st.one_of(journeys(), st.integers(0, 10**9).map(errands)))
+@given(of=st.one_of(journeys(), errands()))
 def test_no_cheapest_policy_is_harmed_less(of: Task) -> None:
     world = World(of)
     if not 1 < world.count <= MOST_POLICIES:

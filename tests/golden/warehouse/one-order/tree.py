@@ -342,17 +342,6 @@ def create_root(robot: Robot) -> Behaviour:
                         guard=lambda: all_of(robot.at("a1"), robot.stored("drill", "a1") is None),
                         keep=False,
                     ),
-                    Latch(
-                        "fetch(drill,a1)",
-                        lambda: robot.fetch("drill", "a1"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            robot.at("a1"),
-                            robot.stored("drill", "a1"),
-                            negated(robot.loaded("drill")),
-                        ),
-                        keep=False,
-                    ),
                     sequence(
                         "for at(packing)",
                         Condition("loaded(drill)", lambda: robot.loaded("drill")),
@@ -386,37 +375,22 @@ def create_root(robot: Robot) -> Behaviour:
                             keep=False,
                         ),
                     ),
-                    sequence(
-                        "for at(a1)",
-                        Condition("at(packing)", lambda: robot.at("packing")),
-                        Latch(
-                            "drive(a1)",
-                            lambda: robot.drive("a1"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                negated(robot.at("a1")),
-                                any_of(
-                                    robot.at("a1"),
-                                    all_of(
-                                        robot.at("packing"),
-                                        negated(robot.blocked("packing", "a1")),
-                                        negated(robot.blocked("a1", "packing")),
-                                    ),
-                                    all_of(
-                                        robot.at("a2"),
-                                        negated(robot.blocked("a2", "a1")),
-                                        negated(robot.blocked("a1", "a2")),
-                                    ),
-                                ),
-                            ),
-                            keep=False,
-                        ),
-                    ),
                     Latch(
                         "scan(drill,a2)",
                         lambda: robot.scan("drill", "a2"),
                         robot.cancel,
                         guard=lambda: all_of(robot.at("a2"), robot.stored("drill", "a2") is None),
+                        keep=False,
+                    ),
+                    Latch(
+                        "fetch(drill,a1)",
+                        lambda: robot.fetch("drill", "a1"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            robot.at("a1"),
+                            robot.stored("drill", "a1"),
+                            negated(robot.loaded("drill")),
+                        ),
                         keep=False,
                     ),
                     Latch(
