@@ -27,8 +27,6 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.belief.draws import Values
-from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import (
     FALSE,
@@ -40,12 +38,11 @@ from bbtc.ground.condition import (
     negation,
 )
 from bbtc.ground.task import Task
-from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.changing_facts import ChangingFacts
-from bbtc.planner.elsewhere import MOST_VISITED, also_at, changed, spread
+from bbtc.planner.elsewhere import MOST_VISITED, changed, spread
 from bbtc.planner.exposure import least_exposed
-from bbtc.planner.mdp.explore import explore_space
+from bbtc.planner.mdp.explore import Explorer
 from bbtc.planner.mdp.graph import Floats, draw_probabilities, sums
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.packing import Flags, bit_test, holds
@@ -109,34 +106,31 @@ def _wide_space(
 ) -> tuple[StateSpace, bool]:
     """All that any actions lead to, also behind the goal and from where others may leave some states, all of
     them if they are few; is that everything? Choices of goal states are left out. Raises ``LimitReached``."""
-    endless = replace(task, goal=FALSE)
-    space = _whole(endless, limits)
-    own = initial_belief(task)
-    wider, all_of_them = endless, False
-    looked_at: set[Values] = set()
+    explorer = Explorer(replace(task, goal=FALSE), limits)
+    explorer.exhaust(limits)
+    all_of_them = False
+    looked_at = 0
     while True:
-        states = [space.packing.values(space.states, row) for row in range(len(space.states))]
-        few = len(states) <= _FEW_STATES
-        known = set(states)
+        space = explorer.space(np.zeros(explorer.count, dtype=np.bool_), None)
+        few = explorer.count <= _FEW_STATES
         # What the others may become was found to be known before.
-        fresh = [values for values in states if values not in looked_at]
-        starts = changed(facts, fresh if few else spread(states, MOST_VISITED), limits)
-        looked_at = known
-        new = [tuple(map(Truth, values)) for values in starts if values not in known]
-        if not new:
+        fresh = range(looked_at, explorer.count) if few else spread(range(explorer.count), MOST_VISITED)
+        looked_at = explorer.count
+        states = map(bytes, space.packing.unpack(space.states[np.array(fresh, dtype=np.int64)]).tolist())
+        explorer.also_start(changed(facts, states, limits))
+        if explorer.count == looked_at:
             all_of_them = few
             break
-        wider = also_at(endless, [*[each.values for each in wider.initial[len(endless.initial) :]], *new])
         try:
-            space = _whole(wider, limits)
+            explorer.exhaust(limits)
         except LimitReached:
             if everywhere:
                 raise
             limits.check_time("the search for a tree that recovers")
             break
         if not few:
+            space = explorer.space(np.zeros(explorer.count, dtype=np.bool_), None)
             break
-    numbers = dict(zip(initial_belief(wider), (number for _, number in space.initial), strict=False))
     goal = holds(space.packing, bit_test(space.packing, task.goal), space.states)
     kept = ~goal[space.choice_state]
     edges = kept[space.edge_choice]
@@ -149,15 +143,8 @@ def _wide_space(
         edge_choice=(np.cumsum(kept) - 1)[space.edge_choice[edges]].astype(np.int32),
         edge_successor=space.edge_successor[edges],
         edge_draw=space.edge_draw[edges],
-        initial=tuple((probability, numbers[values]) for values, probability in own.items()),
     )
     return wide, all_of_them
-
-
-def _whole(task: Task, limits: Limits) -> StateSpace:
-    space = explore_space(task, limits)
-    space.require_complete()
-    return space
 
 
 @dataclass(frozen=True, slots=True)
@@ -393,7 +380,8 @@ class _Learner:
         """The rules as trees, in good order, and as they were learnt, in which more may be shared."""
         waiting = factored(self.task, [self._guarded(rule) for rule in self.waiting()])
         ordered = nearest_first(self.setting, self.rules)
-        return [self._tree(rules, waiting) for rules in (ordered, self.rules)]
+        orders = [ordered] if ordered == self.rules else [ordered, self.rules]
+        return [self._tree(rules, waiting) for rules in orders]
 
     def _tree(self, rules: Sequence[Rule], waiting: Sequence[Node]) -> Node:
         """Rules that are asked only where none of ``ends`` holds, and what comes after them. Nothing that is
