@@ -285,7 +285,7 @@ class _Learner:
             if before is None:
                 before = self._getting_on(taken)
             after = self._getting_on(self._taken(decided, free))
-            if self._given_up(rule.action, covered, before & ~after):
+            if self._given_up(rule.action, covered, before & ~after, taken):
                 before = None
                 continue
             self.decided = decided
@@ -299,16 +299,21 @@ class _Learner:
         """The states from which choices may lead to the goal."""
         return self.graph.reach(self.space.goal, taken).found
 
-    def _given_up(self, action: int, covered: Index, lost: Flags) -> bool:
-        """Give up choices of an action that would leave some states without a way; are there any?"""
+    def _given_up(self, action: int, covered: Index, lost: Flags, taken: Flags) -> bool:
+        """Give up choices of an action that would leave some states without a way; are there any? First those
+        after which costs do not fall, then those in whose place something else may be done."""
         if not lost.any():
             return False
+        states = self.space.choice_state
         culprits = np.zeros(len(lost), dtype=np.bool_)
         culprits[covered[lost[covered]] if lost[covered].any() else covered] = True
-        own = culprits[self.space.choice_state] & (self.space.choice_action == action) & ~self.given_up
-        roundabout = own & ~self.choices.falling
-        self.given_up |= roundabout if roundabout.any() else own
-        return bool(own.any())
+        own = culprits[states] & (self.space.choice_action == action) & ~self.given_up
+        others = self.space.having(taken & (self.space.choice_action != action))
+        for least in (own & ~self.choices.falling, own & others[states], own):
+            if least.any():
+                self.given_up |= least
+                return True
+        return False
 
     def _best(self, taken: Flags, stuck: Flags) -> tuple[Rule, Index] | None:
         """The rule that decides most states for its size, and these."""

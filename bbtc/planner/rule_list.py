@@ -69,7 +69,8 @@ def shortened(setting: Setting, rules: Sequence[Rule], limits: Limits) -> list[R
     if work.will_do(work.rules, work.where):
         try:
             while work.dropped() or work.merged():
-                pass
+                while work.merged():
+                    pass
         except LimitReached:
             pass  # what was done before stays
     return work.rules

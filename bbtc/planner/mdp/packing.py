@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # a strategy that keeps states as integers loads no NumPy
 WORD = 64
 BELIEF = 8 * PLACES
 """Bits that the number of a belief takes."""
+_FEW_BITS = 32
 Words: TypeAlias = "npt.NDArray[np.uint64]"
 """Packed states, a row each."""
 Flags: TypeAlias = "npt.NDArray[np.bool_]"
@@ -147,6 +148,13 @@ class Packing:
 
 def set_bits(bits: int) -> Iterator[int]:
     """The numbers of the bits that are set, in order."""
+    if bits.bit_count() > _FEW_BITS:  # each step below takes time with the length of the number
+        text = bin(bits)[:1:-1]
+        at = text.find("1")
+        while at >= 0:
+            yield at
+            at = text.find("1", at + 1)
+        return
     while bits:
         lowest = bits & -bits
         yield lowest.bit_length() - 1

@@ -138,8 +138,12 @@ class Determinised:
     # --- which actions may start --------------------------------------------------------------
 
     def _index(self) -> None:
-        """Each disjunct of a precondition stands under the rarest of its bits that must be set."""
+        """Each disjunct of a precondition stands under one of its bits that must be set: one that is not set
+        at the start, if possible, since few others are then set in most states, and of these the rarest."""
         often: dict[int, int] = {}
+        at_start = 0
+        for initial in self.task.initial:
+            at_start |= self.packing.pack(bytes(initial.values))
         for action in self.actions:
             for need in action.needs or ():
                 for bit in set_bits(need.value):
@@ -156,7 +160,7 @@ class Determinised:
                 self._other.append((action.number, action.test))
                 continue
             for need in action.needs or ():
-                pivot = min(set_bits(need.value), key=lambda bit: (often[bit], bit))
+                pivot = min(set_bits(need.value), key=lambda bit: (at_start >> bit & 1, often[bit], bit))
                 self._under.setdefault(pivot, []).append((action.number, need.mask, need.value))
                 self._pivots |= 1 << pivot
 

@@ -27,7 +27,7 @@ _FEW_STATES = 200
 """A tree with so many states is simulated in all of them; one with more, in as many as differ in what
 matters."""
 
-_FOR_SURE = 0.6
+_FOR_SURE = 0.7
 """Of the time left, what may be spent on the search for a policy that surely reaches the goal."""
 
 _MOST_SHORT = 6

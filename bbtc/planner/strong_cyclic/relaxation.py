@@ -7,7 +7,7 @@ variable takes a value, unknown among them, as a fact of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 
@@ -327,9 +327,8 @@ class Relaxation:
         # What would be true without them, and makes no difference.
         kept = without(kept, ~state & self._two_valued & ~self._masks[2])
         free, simple = 0, kept.mask & self._two_valued & ~(kept.value & self.exclusion.members)
-        for bit in set_bits(simple):
-            if reach.add((4 * bit, 4 * bit + 2)):
-                free |= 1 << bit
+        for bit in reach.each([*set_bits(simple)], lambda bit: (4 * bit, 4 * bit + 2)):
+            free |= 1 << bit
         rest, kept = without(kept, simple), without(kept, free)
         for literal in sorted(literals(self.packing, rest), key=lambda each: each.value != 0):
             kept = self._freed(reach, kept, literal)
@@ -412,3 +411,13 @@ class _Reach:
         for fact in new:
             self.reached[fact] = 0
         return False
+
+    def each(self, items: list[int], facts: Callable[[int], tuple[int, ...]]) -> Iterator[int]:
+        """Add the facts of some items, one after the other, as far as they do not reach the goal: the items
+        that were added. More facts reach no less, so many are tried at once, and halves where that fails."""
+        if self.add([fact for item in items for fact in facts(item)]):
+            yield from items
+        elif len(items) > 1:
+            middle = len(items) // 2
+            yield from self.each(items[:middle], facts)
+            yield from self.each(items[middle:], facts)
