@@ -276,6 +276,16 @@ class Reading(NamedTuple):
     reward: Fraction
 
 
+class Happening(NamedTuple):
+    """One of the things that a change may do in a world: what the robot is shown and told, as in
+    :class:`Reading`, the world after, and the probability."""
+
+    shown: Delta
+    told: Delta
+    world: int
+    probability: Fraction
+
+
 class Readings:
     """What the robot may be told by a change of hidden facts, and what it believes then."""
 
@@ -313,9 +323,13 @@ class Readings:
         """What may happen in one world: what is seen of the seen variables, what is believed then, the world
         after, and the probability."""
         beliefs = {(reading.shown, reading.told): reading.belief for reading in self.after(number, seen)}
+        for part in self.parts(seen, world):
+            yield part.shown, beliefs[part.shown, part.told], part.world, part.probability
+
+    def parts(self, seen: bytes, world: int) -> Iterator[Happening]:
+        """What may happen in one world, whatever is believed."""
         for part in self._kernel.of(world, seen):
-            shown, told = self._split(part.told)
-            yield shown, beliefs[shown, told], part.world, part.probability
+            yield Happening(*self._split(part.told), part.world, part.probability)
 
     def _split(self, told: _Told) -> tuple[Delta, Delta]:
         """What is seen of the seen variables, and what the observations told."""

@@ -50,8 +50,9 @@ def initial_belief(task: Task) -> dict[Values, Fraction]:
 _LOOK = 4096  # combinations of outcomes between two looks at the clock
 
 
-class _Bounded:
-    """Ends the multiplication of outcomes: n independent draws may have 2 to the n results."""
+class Bounded:
+    """A :data:`bbtc.belief.draws.Spend` that ends the multiplication of outcomes: n independent draws may
+    have 2 to the n results."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
@@ -72,7 +73,7 @@ def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transiti
     first (ties by values). Results are cached per assignment. The function raises
     :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on states, or
     for longer than time and memory allow."""
-    bounded = _Bounded(limits)
+    bounded = Bounded(limits)
     factors = (factor for factor in action.factors if factor != NO_CHANGE)
     drawers = [compile_factor(factor, bounded.spend) for factor in factors]
     drawers += [compile_change(task, change, bounded.spend) for change in action.changes]
