@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 
 from bbtc.limits import Limits
-from bbtc.markov import Row, solve
+from bbtc.markov import Row, solve, weighted
 from bbtc.planner.mdp.graph import Floats, Graph, draw_probabilities, sums
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.state_space import Number
@@ -134,7 +134,7 @@ class Equations:
 
     def _exact_value(self, choice: int, values: list[Fraction]) -> Fraction:
         own, row = self._row(choice)
-        return own + sum((p * values[successor] for successor, p in row.items()), _ZERO)
+        return weighted(((p, values[successor]) for successor, p in row.items()), own)
 
     def _row(self, choice: int) -> tuple[Fraction, Row]:
         """What a choice (numbered as in the space) is worth for itself, and its probabilities."""
