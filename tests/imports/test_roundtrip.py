@@ -22,7 +22,7 @@ from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree, walk
 from bbtc.tree.validate import check_tree
 from tests.backends.test_btcpp import nested
-from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.domains.problems import PROBLEMS, Problem, tree_of
 from tests.imports.labels import labelled
 from tests.long_form import amount
 from tests.profiles import examples
@@ -79,7 +79,7 @@ def without_ids(tree: Tree) -> Node:
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_the_tree_of_every_problem_comes_back(problem: Problem) -> None:
-    tree = plan_of(problem).tree
+    tree = tree_of(problem)
     for options in OPTIONS:
         assert read(exported(tree, **options), tree.task) == tree
     assert load_tree(SourceFile("tree.json", dumps(tree_to_json(tree))), tree.task) == tree

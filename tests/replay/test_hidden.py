@@ -34,7 +34,7 @@ from bbtc.source import SourceFile
 from bbtc.tree.monitor import FIRST, Monitor
 from bbtc.tree.nodes import Tree
 from tests.belief.hidden_tasks import search, tiger
-from tests.domains.problems import PROBLEMS, plan_of
+from tests.domains.problems import PROBLEMS, tree_of
 from tests.hidden.texts import texts
 from tests.long_form import amount
 from tests.profiles import examples
@@ -159,7 +159,7 @@ def test_trees_of_the_domains_run_as_simulated(name: EngineName) -> None:
         for problem in PROBLEMS:
             if problem.domain not in HIDDEN:
                 continue
-            tree = plan_of(problem).tree
+            tree = tree_of(problem)
             watched = with_monitor(tree, Limits())
             assert watched is not None or problem.domain == "corridors", problem
             if watched is not None:

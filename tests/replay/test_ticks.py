@@ -12,7 +12,7 @@ from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
 from bbtc.planner.options import Options
 from bbtc.replay.script import Values
-from tests.domains.problems import PROBLEMS, Problem, plan_of, task_of
+from tests.domains.problems import PROBLEMS, Problem, task_of, tree_of
 from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import busy_tree
@@ -75,9 +75,7 @@ def test_plans_run_as_in_the_reference_whatever_changes(
 ) -> None:
     with engine(name) as (version, make):
         compared = Compared(record_property, f"plans in restless worlds: reference and {version}")
-        for problem, tree in (
-            (p, tree) for p in QUICK for tree in (plan_of(p).tree, plan_of(p, "refine").tree)
-        ):
+        for problem, tree in ((p, tree) for p in QUICK for tree in (tree_of(p), tree_of(p, "refine"))):
             replay, rng = make(tree, "imported"), random.Random(1)
             for _ in range(10):
                 script = random_script(tree.task, rng, TICKS)
@@ -90,7 +88,7 @@ def test_plans_run_as_in_the_reference_whatever_changes(
 @pytest.mark.parametrize("options", [None, Options()], ids=["refine", "guarded"])
 @pytest.mark.parametrize("problem", QUICK, ids=str)
 def test_plans_are_sound_whatever_changes(problem: Problem, options: Options | None) -> None:
-    tree, rng = plan_of(problem, "refine").tree, random.Random(1)
+    tree, rng = tree_of(problem, "refine"), random.Random(1)
     if options is not None:
         tree = plan_task(tree.task, None, "auto", Limits(), lambda _: None, options=options).tree
     for _ in range(200):
