@@ -9,6 +9,7 @@ trees and up to 500 scenarios, each with every timing.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 
@@ -24,6 +25,7 @@ from tests.replay.all_engines import ENGINES, Compared, EngineName, Runtime, eng
 from tests.replay.covering import covering
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import expected_run
+from tests.sharing import shared
 
 CHUNKS = 8
 TREES = amount(63, 125)
@@ -35,9 +37,14 @@ MOST = amount(30, 500)
 TIMINGS: tuple[Timing, ...] = ("between", "during", "within")
 
 
-def lively_trees(chunk: int) -> Iterator[tuple[int, Tree, list[Scenario]]]:
+@functools.cache
+def lively_trees(chunk: int) -> list[tuple[int, Tree, list[Scenario]]]:
     """Random trees that end, each with its scenarios (see above), in one of
-    which at least three actions start; and a number for each."""
+    which at least three actions start; and a number for each. One worker of a test run finds them."""
+    return shared(f"lively-trees-{chunk}", lambda: list(_lively_trees(chunk)))
+
+
+def _lively_trees(chunk: int) -> Iterator[tuple[int, Tree, list[Scenario]]]:
     found = 0
     for seed in itertools.count(chunk, CHUNKS):
         tree = busy_tree(seed, starts=3)
