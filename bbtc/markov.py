@@ -47,12 +47,13 @@ def weighted(pairs: Iterable[tuple[Fraction, Fraction]], more: Fraction = _ZERO)
     end, and not at each step."""
     numerator, denominator = more.as_integer_ratio()
     for weight, value in pairs:
-        if value is _ZERO:
+        part = weight.numerator * value.numerator
+        if not part:
             continue
-        part, below = weight.numerator * value.numerator, weight.denominator * value.denominator
+        below = weight.denominator * value.denominator
         if below == denominator:
             numerator += part
-        elif part:
+        else:
             common = gcd(below, denominator)
             scale = below // common
             numerator = numerator * scale + part * (denominator // common)
