@@ -33,6 +33,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish() -> None:
+    """Nobody needs to look for cycles in all that was made, when the process ends."""
+    gc.freeze()
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Print the sums of what tests say with ``record_property("compared", (what, unit, number))``."""
     sums: dict[str, dict[str, int]] = {}
