@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import Draw, Values, compile_factor, product_of
 from bbtc.belief.hidden import compile_change, told_first
-from bbtc.ground.task import NO_CHANGE, GroundAction, Task
+from bbtc.ground.task import NO_CHANGE, ZERO, GroundAction, Task
 from bbtc.limits import Limits
 from bbtc.markov import distribution
 
@@ -96,7 +96,9 @@ def _results(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> tup
         after = bytearray(values)
         for variable, value in delta:
             after[variable] = value
-        key = (bytes(after), cost + extra, reward)
-        merged[key] = merged.get(key, Fraction(0)) + probability
+        key = (bytes(after), cost if extra is ZERO else cost + extra, reward)
+        merged[key] = merged[key] + probability if key in merged else probability
     results = [Result(p, c, r, v) for (v, c, r), p in merged.items()]
-    return tuple(sorted(results, key=lambda r: (-r.probability, r.values, r.cost, r.reward)))
+    if len(results) > 1:
+        results.sort(key=lambda r: (-r.probability, r.values, r.cost, r.reward))
+    return tuple(results)

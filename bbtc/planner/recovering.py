@@ -108,7 +108,7 @@ def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateS
     wider, all_of_them = endless, False
     looked_at: set[Values] = set()
     while True:
-        states = [space.packing.values(space.states, row) for row in range(len(space.states))]
+        states = space.packing.values(space.states)
         few = len(states) <= _FEW_STATES
         known = set(states)
         # What the others may become was found to be known before.
