@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import TypeVar
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain
@@ -21,6 +22,8 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.planner.objective import Elsewhere
+
+_T = TypeVar("_T")
 
 MOST_VISITED = 40
 """States in which all that may change is looked at."""
@@ -68,7 +71,7 @@ def changed(facts: ChangingFacts, states: Iterable[Values], limits: Limits) -> l
     return [*found]
 
 
-def spread(states: Sequence[Values], most: int) -> Sequence[Values]:
+def spread(states: Sequence[_T], most: int) -> Sequence[_T]:
     """So many of them at most, from all over."""
     return states[:: max(1, -(-len(states) // most))]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import count
@@ -12,7 +12,7 @@ from typing_extensions import assert_never
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.simulate import figures
 from bbtc.belief.tick import NodeStatus, compile_tick
-from bbtc.ground.condition import FALSE, Condition, Is, conjunction, conjuncts, doubt, negation
+from bbtc.ground.condition import FALSE, TRUE, Condition, Is, conjunction, conjuncts, doubt, negation
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -48,7 +48,10 @@ def guarded(plan: Plan) -> Plan:
 
 def with_guards(task: Task, root: Node) -> Node:
     """A tree with the checks of :func:`guarded`."""
-    return _with_goal(task, _Guarding(task, Facts(task), _fresh(root)).node(root, _Last()))
+    depending: set[str] = set()
+    _depending(task, root, depending, kept=False)
+    guarding = _Guarding(task, Facts(task), _fresh(root), depending, any(retries_of(root)))
+    return _with_goal(task, guarding.node(root, _Last()) if root.id in depending else root)
 
 
 def most_more(task: Task) -> int:
@@ -66,6 +69,24 @@ def _ending_anew(task: Task, root: Node, chain: Chain) -> Chain:
     return replace(chain, status=tuple(status))
 
 
+def _depending(task: Task, node: Node, found: set[str], *, kept: bool) -> None:
+    """Find the nodes with an action below whose guard depends on what is sure there."""
+    match node:
+        case ConditionNode():
+            pass
+        case ActionNode():
+            always = task.action_by_name[node.action].precondition == TRUE
+            if not (kept if node.guarded else always):
+                found.add(node.id)
+        case ControlNode():
+            for child in node.children:
+                _depending(task, child, found, kept=kept or node.template is not None)
+                if child.id in found:
+                    found.add(node.id)
+        case _:
+            assert_never(node)
+
+
 @dataclass(slots=True)
 class _Guarding:
     """A walk through a tree, with what is sure at each node."""
@@ -73,6 +94,10 @@ class _Guarding:
     task: Task
     facts: Facts
     fresh: Iterator[str]
+    depending: Set[str]
+    """The nodes with an action below whose guard depends on what is sure there."""
+    retries: bool
+    """Are there retry nodes? Only below these it matters what has its turn after an action."""
     kept: bool = False
     """Here guards stay as they are: templates keep the form that their author gave them."""
 
@@ -99,11 +124,17 @@ class _Guarding:
             (child,) = node.children
             return replace(node, children=(self.node(child, _Last(last.of_all, last.of_all), bounded=True),))
         children: list[Node] = []
+        told = 0
         with self.facts.meanwhile():
             for at, child in enumerate(node.children):
-                rest = node.children[at + 1 :] if node.kind == "fallback" else ()
+                if child.id not in self.depending:
+                    children.append(child)
+                    continue
+                for earlier in children[told:]:  # what they returned matters from here on
+                    self.facts.add(returned(self.task, earlier, GO_ON[node.kind], bounded=bounded))
+                told = at
+                rest = node.children[at + 1 :] if self.retries and node.kind == "fallback" else ()
                 children.append(self.node(child, self._last(last, rest, bounded), bounded=bounded))
-                self.facts.add(returned(self.task, children[-1], GO_ON[node.kind], bounded=bounded))
         return replace(node, children=tuple(children))
 
     @contextmanager

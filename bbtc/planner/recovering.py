@@ -3,30 +3,30 @@
 1. All states that any actions lead to are explored, and what one change
    (:mod:`bbtc.planner.changing_facts`) and any actions make of some of them.
 2. P* and the least cost V are found for all of them.
-3. A state that runs visit may take the choices that attain V, as in :mod:`bbtc.planner.synthesis.permissive`;
-   any other one those that attain P* and cost little more, since that costs the runs nothing.
+3. A state that runs visit may take the choices that attain V, as in :mod:`bbtc.planner.synthesis.permissive`,
+   and of these the ones that others' changes harm least (:mod:`bbtc.planner.exposure`); any other one those
+   that attain P* and cost little more, since that costs the runs nothing.
 4. Rules are learnt one by one, as in :mod:`bbtc.planner.synthesis.rules`, but for their guards: an action
    reads its precondition by itself, so a rule tells apart only states in which that is not false, and most
    rules need no test at all. What a rule decides must leave a way to the goal from everywhere; choices that
    would not are given up. States that no run visits any more are free to take what is near enough.
 5. Where runs end since nothing leads to the goal any more, rules must not go on. Either each of them tells
    such states apart, or one condition before them all does, whichever takes fewer nodes.
-6. Last come rules for states without hope that only others lead to: an action, if possible one that the tree
+6. What later rules made needless is taken out, and the rules are put in order
+   (:mod:`bbtc.planner.rule_list`).
+7. Last come rules for states without hope that only others lead to: an action, if possible one that the tree
    has, is tried until others have put things right.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.belief.draws import Values
-from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import (
     FALSE,
@@ -38,20 +38,21 @@ from bbtc.ground.condition import (
     negation,
 )
 from bbtc.ground.task import Task
-from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.changing_facts import ChangingFacts
-from bbtc.planner.elsewhere import MOST_VISITED, also_at, changed, spread
-from bbtc.planner.mdp.explore import explore_space
-from bbtc.planner.mdp.graph import draw_probabilities, sums
+from bbtc.planner.elsewhere import MOST_VISITED, changed, spread
+from bbtc.planner.exposure import least_exposed
+from bbtc.planner.mdp.explore import Explorer
+from bbtc.planner.mdp.graph import Floats, draw_probabilities, sums
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
 from bbtc.planner.mdp.packing import Flags, bit_test, holds
 from bbtc.planner.mdp.ssp import least_cost
 from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.planner.mdp.transitions import Index
+from bbtc.planner.rule_list import Rule, Setting, nearest_first, shortened
 from bbtc.planner.strong_cyclic.rules import certainly
 from bbtc.planner.strong_cyclic.sharing import Guarded, factored
-from bbtc.planner.synthesis.rules import Literal, Stated, literals_of, rule_size, separating
+from bbtc.planner.synthesis.rules import Stated, literals_of, rule_size, separating
 from bbtc.rewrite.simplify import numbered, size
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
@@ -84,52 +85,52 @@ class Recovering:
 def recovering_tree(task: Task, limits: Limits, *, everywhere: bool = False) -> Recovering | None:
     """A tree that does what it can from anywhere; None where costs are not known. Raises ``LimitReached``,
     and with ``everywhere`` also where not all states are looked at."""
-    space, all_of_them = _wide_space(task, limits, everywhere=everywhere)
+    facts = ChangingFacts.of(task, limits)
+    space, all_of_them = _wide_space(task, facts, limits, everywhere=everywhere)
     found = max_prob(space, limits)
-    choices = _choices(found, limits)
+    choices = _choices(found, facts, limits)
     if choices is None:
         return None
-    trees = []
+    trees: list[Node] = []
     for apart in (False, True):
         learner = _Learner(task, found, choices, limits, apart=apart)
-        trees.append(_tree(task, learner.stated_ends(), list(learner.deciding()), learner.waiting()))
+        learner.learn()
+        trees += learner.trees()
         if not learner.stuck.any():
             break
     return Recovering(min(trees, key=size), found.initial, all_of_them)
 
 
-def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateSpace, bool]:
+def _wide_space(
+    task: Task, facts: ChangingFacts, limits: Limits, *, everywhere: bool
+) -> tuple[StateSpace, bool]:
     """All that any actions lead to, also behind the goal and from where others may leave some states, all of
     them if they are few; is that everything? Choices of goal states are left out. Raises ``LimitReached``."""
-    endless = replace(task, goal=FALSE)
-    space = _whole(endless, limits)
-    facts = ChangingFacts.of(task, limits)
-    own = initial_belief(task)
-    wider, all_of_them = endless, False
-    looked_at: set[Values] = set()
+    explorer = Explorer(replace(task, goal=FALSE), limits)
+    explorer.exhaust(limits)
+    all_of_them = False
+    looked_at = 0
     while True:
-        states = space.packing.values(space.states)
-        few = len(states) <= _FEW_STATES
-        known = set(states)
+        space = explorer.space(np.zeros(explorer.count, dtype=np.bool_), None)
+        few = explorer.count <= _FEW_STATES
         # What the others may become was found to be known before.
-        fresh = [values for values in states if values not in looked_at]
-        starts = changed(facts, fresh if few else spread(states, MOST_VISITED), limits)
-        looked_at = known
-        new = [tuple(map(Truth, values)) for values in starts if values not in known]
-        if not new:
+        fresh = range(looked_at, explorer.count) if few else spread(range(explorer.count), MOST_VISITED)
+        looked_at = explorer.count
+        states = map(bytes, space.packing.unpack(space.states[np.array(fresh, dtype=np.int64)]).tolist())
+        explorer.also_start(changed(facts, states, limits))
+        if explorer.count == looked_at:
             all_of_them = few
             break
-        wider = also_at(endless, [*[each.values for each in wider.initial[len(endless.initial) :]], *new])
         try:
-            space = _whole(wider, limits)
+            explorer.exhaust(limits)
         except LimitReached:
             if everywhere:
                 raise
             limits.check_time("the search for a tree that recovers")
             break
         if not few:
+            space = explorer.space(np.zeros(explorer.count, dtype=np.bool_), None)
             break
-    numbers = dict(zip(initial_belief(wider), (number for _, number in space.initial), strict=False))
     goal = holds(space.packing, bit_test(space.packing, task.goal), space.states)
     kept = ~goal[space.choice_state]
     edges = kept[space.edge_choice]
@@ -142,28 +143,23 @@ def _wide_space(task: Task, limits: Limits, *, everywhere: bool) -> tuple[StateS
         edge_choice=(np.cumsum(kept) - 1)[space.edge_choice[edges]].astype(np.int32),
         edge_successor=space.edge_successor[edges],
         edge_draw=space.edge_draw[edges],
-        initial=tuple((probability, numbers[values]) for values, probability in own.items()),
     )
     return wide, all_of_them
 
 
-def _whole(task: Task, limits: Limits) -> StateSpace:
-    space = explore_space(task, limits)
-    space.require_complete()
-    return space
-
-
 @dataclass(frozen=True, slots=True)
 class _Choices:
-    """Choices that attain the least cost (``best``), all that are ``near`` enough elsewhere, and of these the
-    ones after which the expected cost falls."""
+    """Choices that attain the least cost, of these the ones least exposed to changes (``best``), all that are
+    ``near`` enough elsewhere, and of these the ones after which the expected cost falls; the least cost of
+    each state."""
 
     best: Flags
     near: Flags
     falling: Flags
+    costs: Floats
 
 
-def _choices(found: MaxProb, limits: Limits) -> _Choices | None:
+def _choices(found: MaxProb, facts: ChangingFacts, limits: Limits) -> _Choices | None:
     cheapest = least_cost(found, limits)
     if cheapest is None:
         return None
@@ -186,15 +182,9 @@ def _choices(found: MaxProb, limits: Limits) -> _Choices | None:
     onward = sums(space.edge_choice, weight * cheapest.values[space.edge_successor], count)
     values = cheapest.values[space.choice_state]
     more = own + onward - values - _CLOSE * (1 + values)
-    return _Choices(best, found.best & (more <= _NEAR * own), found.best & (more <= _FALLING * own))
-
-
-@dataclass(frozen=True, slots=True)
-class _Rule:
-    """Start ``action`` (its number in the task) where its precondition and all of ``tests`` hold."""
-
-    tests: tuple[int, ...]
-    action: int
+    best = least_exposed(found, best, facts, limits)
+    near, falling = (found.best & (more <= share * own) for share in (_NEAR, _FALLING))
+    return _Choices(best, near, falling, cheapest.values)
 
 
 class _Learner:
@@ -215,7 +205,8 @@ class _Learner:
         self.decided = np.full(len(values), -1, dtype=np.int64)
         """The action of each state that a rule decides."""
         self.undecided = self.hopeful.copy()
-        self.rules: list[_Rule] = []
+        self.rules: list[Rule] = []
+        """Those that lead to the goal."""
         self._starts: dict[int, Flags] = {}
         self.stuck = self._stuck(self._visited())
         """Where runs may end without the goal."""
@@ -224,6 +215,16 @@ class _Learner:
         self.asked = np.ones(len(values), dtype=np.bool_)
         for tests in self.ends:
             self.asked &= ~self.holds[:, tests].all(axis=1)
+        self.setting = Setting(
+            self.graph,
+            self.holds,
+            self._may_start,
+            self.hopeful,
+            self.asked,
+            choices.best,
+            choices.near,
+            choices.costs,
+        )
 
     def _stuck(self, visited: Flags) -> Flags:
         return visited & ~self.hopeful & ~self.space.goal
@@ -267,8 +268,8 @@ class _Learner:
 
     # --- rules ------------------------------------------------------------------------------------
 
-    def deciding(self) -> Iterator[tuple[tuple[Literal, ...], int]]:
-        """The rules that lead to the goal."""
+    def learn(self) -> None:
+        """Find the rules that lead to the goal."""
         visited = self._visited()
         before: Flags | None = None
         while True:
@@ -277,7 +278,7 @@ class _Learner:
             taken = self._taken(self.decided, free)
             found = self._best(taken, self._stuck(visited) & self.asked)
             if found is None:
-                return
+                break
             rule, covered = found
             decided = self.decided.copy()
             decided[covered] = rule.action
@@ -292,7 +293,7 @@ class _Learner:
             visited, last = self._visited(), visited
             before = after if (visited == last).all() else None
             self.rules.append(rule)
-            yield self._stated(rule)
+        self.rules = shortened(self.setting, self.rules, self.limits)
 
     def _getting_on(self, taken: Flags) -> Flags:
         """The states from which choices may lead to the goal."""
@@ -309,10 +310,10 @@ class _Learner:
         self.given_up |= roundabout if roundabout.any() else own
         return bool(own.any())
 
-    def _best(self, taken: Flags, stuck: Flags) -> tuple[_Rule, Index] | None:
+    def _best(self, taken: Flags, stuck: Flags) -> tuple[Rule, Index] | None:
         """The rule that decides most states for its size, and these."""
         open_choices = taken & self.undecided[self.space.choice_state]
-        best: tuple[tuple[float, int], _Rule, Index] | None = None
+        best: tuple[tuple[float, int], Rule, Index] | None = None
         for action in np.unique(self.space.choice_action[open_choices]).tolist():
             able = np.zeros(len(stuck), dtype=np.bool_)
             able[self.space.choice_state[open_choices & (self.space.choice_action == action)]] = True
@@ -325,17 +326,18 @@ class _Learner:
             covered = wanted[self.holds[wanted][:, tests].all(axis=1)]
             key = (-len(covered) / rule_size(tests), len(tests))
             if best is None or key < best[0]:
-                best = key, _Rule(tuple(tests), action), covered
+                best = key, Rule((tuple(tests),), action), covered
         return None if best is None else best[1:]
 
-    def waiting(self) -> list[tuple[tuple[Literal, ...], int]]:
-        """Rules for states without hope that no run visits; first of actions that the tree has."""
+    def waiting(self) -> list[Rule]:
+        """Rules for states without hope that no run visits, one for each action, in any order; first of
+        actions that the tree has."""
         visited = self._visited()
         stuck = self._stuck(visited)
         idle = ~self.hopeful & ~self.space.goal & ~visited
         for rule in self.rules:
-            idle &= ~(self.asked & self._applies(rule))
-        rules: list[_Rule] = []
+            idle &= ~(self.asked & self.setting.applies(rule))
+        rules: list[Rule] = []
         left = idle.copy()
         used = {rule.action for rule in self.rules}
         for actions in (sorted(used), [a for a in range(len(self.task.actions)) if a not in used]):
@@ -350,18 +352,16 @@ class _Learner:
             covered = np.zeros(len(idle), dtype=np.bool_)
             for other in rules:
                 if other is not rule:
-                    covered |= self._applies(other)
+                    covered |= self.setting.applies(other)
             if not (idle & ~left & ~covered).any():
                 rules.remove(rule)
-        return [self._stated(rule) for rule in rules]
+        ways: dict[int, tuple[tuple[int, ...], ...]] = {}
+        for rule in rules:
+            ways[rule.action] = ways.get(rule.action, ()) + rule.ways
+        return [Rule(own, action) for action, own in ways.items()]
 
-    def _applies(self, rule: _Rule) -> Flags:
-        """Where a rule has its action started, if it is asked."""
-        found: Flags = self.holds[:, rule.tests].all(axis=1) & self._may_start(rule.action)
-        return found
-
-    def _best_wait(self, actions: list[int], idle: Flags, stuck: Flags) -> tuple[_Rule, Flags] | None:
-        best: tuple[float, _Rule, Flags] | None = None
+    def _best_wait(self, actions: list[int], idle: Flags, stuck: Flags) -> tuple[Rule, Flags] | None:
+        best: tuple[float, Rule, Flags] | None = None
         for action in actions:
             wanted = idle & self._may_start(action)
             if not wanted.any():
@@ -371,50 +371,34 @@ class _Learner:
             covered = wanted & self.holds[:, tests].all(axis=1)
             key = -int(covered.sum()) / rule_size(tests)
             if best is None or key < best[0]:
-                best = key, _Rule(tuple(tests), action), covered
+                best = key, Rule((tuple(tests),), action), covered
         return None if best is None else best[1:]
 
-    def stated_ends(self) -> list[tuple[Literal, ...]]:
-        """The same as literals."""
-        return [tuple(self.literals[test] for test in tests) for tests in self.ends]
+    # --- the tree ---------------------------------------------------------------------------------
 
-    def _stated(self, rule: _Rule) -> tuple[tuple[Literal, ...], int]:
-        return tuple(self.literals[test] for test in rule.tests), rule.action
+    def trees(self) -> list[Node]:
+        """The rules as trees, in good order, and as they were learnt, in which more may be shared."""
+        waiting = factored(self.task, [self._guarded(rule) for rule in self.waiting()])
+        ordered = nearest_first(self.setting, self.rules)
+        orders = [ordered] if ordered == self.rules else [ordered, self.rules]
+        return [self._tree(rules, waiting) for rules in orders]
 
+    def _tree(self, rules: Sequence[Rule], waiting: Sequence[Node]) -> Node:
+        """Rules that are asked only where none of ``ends`` holds, and what comes after them. Nothing that is
+        read is ever unknown, but for an action's precondition."""
+        branches = factored(self.task, [self._guarded(rule) for rule in rules])
+        if self.ends and branches:
+            going_on = conjunction(negation(self._all(tests)) for tests in self.ends)
+            first = branches[0] if len(branches) == 1 else ControlNode("", "fallback", tuple(branches))
+            branches = [ControlNode("", "sequence", (ConditionNode("", going_on), first))]
+        goal = ConditionNode("", certainly(self.task, self.task.goal))
+        branches = [*branches, *waiting]
+        return numbered(ControlNode("", "fallback", (goal, *branches)) if branches else goal)
 
-_Stated: TypeAlias = tuple[tuple[Literal, ...], int]
-"""Start an action where these hold."""
+    def _guarded(self, rule: Rule) -> Guarded:
+        action = self.task.actions[rule.action]
+        node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
+        return conjuncts(disjunction(self._all(tests) for tests in rule.ways)), node
 
-
-def _tree(task: Task, ends: list[tuple[Literal, ...]], rules: list[_Stated], waiting: list[_Stated]) -> Node:
-    """The rules as a tree, the first of them only where none of ``ends`` holds. Nothing that is read is ever
-    unknown, but for an action's precondition."""
-    goal = ConditionNode("", certainly(task, task.goal))
-    last = _merged([_guarded(task, rule) for rule in waiting])
-    if not ends or not rules:
-        branches = factored(task, [*[_guarded(task, rule) for rule in rules], *last])
-    else:
-        going_on = conjunction(
-            negation(conjunction(certainly(task, literal.condition) for literal in tests)) for tests in ends
-        )
-        inner = factored(task, [_guarded(task, rule) for rule in rules])
-        first = inner[0] if len(inner) == 1 else ControlNode("", "fallback", tuple(inner))
-        branches = [ControlNode("", "sequence", (ConditionNode("", going_on), first))]
-        branches += factored(task, last)
-    return numbered(ControlNode("", "fallback", (goal, *branches)) if branches else goal)
-
-
-def _guarded(task: Task, rule: _Stated) -> Guarded:
-    tests, number = rule
-    action = task.actions[number]
-    node = ActionNode("", action.name, latched=False, guarded=action.precondition != TRUE)
-    needed = [certainly(task, literal.condition) for literal in tests]
-    return tuple(part for each in needed for part in conjuncts(each)), node
-
-
-def _merged(rules: list[Guarded]) -> list[Guarded]:
-    """Rules whose order does not matter, one for each action."""
-    needed: dict[ActionNode, list[Condition]] = {}
-    for guards, action in rules:
-        needed.setdefault(action, []).append(conjunction(guards))
-    return [(conjuncts(disjunction(own)), action) for action, own in needed.items()]
+    def _all(self, tests: Sequence[int]) -> Condition:
+        return conjunction(certainly(self.task, self.literals[test].condition) for test in tests)

@@ -132,7 +132,7 @@ class Exact:
                     changed[key] = changed.get(key, 0.0) + p * q
             belief = {}
             for key, p in changed.items():
-                kind, results = self._ticked(key)
+                kind, results = self.ticked(key)
                 if kind not in ("ready", "unready"):
                     found[kind] += p
                     if kind in ("failure", "blocked"):
@@ -152,7 +152,7 @@ class Exact:
         onward = np.zeros((len(numbers), len(numbers)))
         done = np.zeros(len(numbers))
         for state, number in numbers.items():
-            kind, after = self._ticked((state, (), (), ()))
+            kind, after = self.ticked((state, (), (), ()))
             done[number] = kind == "success"
             for p, _, (successor, *memory) in after:
                 assert not any(memory)
@@ -167,7 +167,8 @@ class Exact:
         values[going] = np.linalg.solve(inner, onward[going] @ done)
         return {state: float(values[number]) for state, number in numbers.items()}
 
-    def _ticked(self, key: Key) -> tuple[str, After]:
+    def ticked(self, key: Key) -> tuple[str, After]:
+        """What a tick comes to, ``ready`` or ``unready`` where it starts an action, and where that leads."""
         if key in self._seen:
             return self._seen[key]
         state, finished, tries, lost = key

@@ -7,12 +7,14 @@ number and their probabilities as rationals.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from bbtc.belief.draws import Values
 from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
@@ -108,6 +110,16 @@ class Explorer:
             if not done:
                 raise
         return done
+
+    def exhaust(self, limits: Limits) -> None:
+        """Expand all that was found, and all that it leads to; what was expanded so far was so in order.
+        Raises ``LimitReached``."""
+        while self._last + 1 < self.count:
+            self.expand(np.arange(self._last + 1, self.count), limits)
+
+    def also_start(self, states: Iterable[Values]) -> None:
+        """Count some states as found."""
+        self.table.number(self.packing.split(self.packing.pack(values) for values in states))
 
     def _room(self, limits: Limits) -> int:
         """As many states as may be expected to fit into what the limits leave."""

@@ -109,7 +109,8 @@ def _exactly(search: Search, limits: Limits) -> MaxProb:
 
 def _belief(pomdp: Pomdp, explorer: Explorer, state: int) -> tuple[int, Floats]:
     """The class and the weights of a state."""
-    return pomdp.belief(explorer.packing.values(explorer.table.states, state))
+    (values,) = explorer.packing.values(explorer.table.states[state : state + 1])
+    return pomdp.belief(values)
 
 
 def _edges(choices: Choices, action: int) -> Iterator[tuple[int, int]]:

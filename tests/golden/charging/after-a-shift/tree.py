@@ -317,13 +317,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.docked(),
                 ),
             ),
-            Latch(
-                "check_charger()",
-                robot.check_charger,
-                robot.cancel,
-                guard=lambda: all_of(robot.at("station"), robot.docked() is None),
-                keep=False,
-            ),
             sequence(
                 "for patrolled(lobby)",
                 Condition("not patrolled(lobby)", lambda: negated(robot.patrolled("lobby"))),
@@ -336,22 +329,18 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             Latch(
+                "check_charger()",
+                robot.check_charger,
+                robot.cancel,
+                guard=lambda: all_of(robot.at("station"), robot.docked() is None),
+                keep=False,
+            ),
+            Latch(
                 "return_to_dock(station)",
                 lambda: robot.return_to_dock("station"),
                 robot.cancel,
                 guard=lambda: negated(robot.at("station")),
                 keep=False,
-            ),
-            sequence(
-                "sequence",
-                Condition("not battery(half)", lambda: negated(robot.battery("half"))),
-                Latch(
-                    "dock(station)",
-                    lambda: robot.dock("station"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("station"), negated(robot.docked())),
-                    keep=False,
-                ),
             ),
             sequence(
                 "for at(lobby)",
@@ -364,8 +353,14 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
-            Latch("charge()", robot.charge, robot.cancel, guard=robot.docked, keep=False),
-            Latch("dock(station)", lambda: robot.dock("station"), robot.cancel, keep=False),
+            Latch(
+                "dock(station)",
+                lambda: robot.dock("station"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("station"), negated(robot.docked())),
+                keep=False,
+            ),
+            Latch("charge()", robot.charge, robot.cancel, keep=False),
         ),
         READS,
     )
@@ -476,7 +471,6 @@ def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) 
 READS: dict[Fact, bool] = {
     ("at", "lobby"): False,
     ("at", "station"): False,
-    ("battery", "half"): False,
     ("battery", "low"): False,
     ("docked",): True,
     ("patrolled", "lobby"): False,

@@ -317,13 +317,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.patrolled("workshop"),
                 ),
             ),
-            Latch(
-                "check_charger()",
-                robot.check_charger,
-                robot.cancel,
-                guard=lambda: all_of(robot.at("station"), robot.docked() is None),
-                keep=False,
-            ),
             sequence(
                 "sequence",
                 Condition(
@@ -368,6 +361,13 @@ def create_root(robot: Robot) -> Behaviour:
                     guard=lambda: robot.at("workshop"),
                     keep=False,
                 ),
+            ),
+            Latch(
+                "check_charger()",
+                robot.check_charger,
+                robot.cancel,
+                guard=lambda: all_of(robot.at("station"), robot.docked() is None),
+                keep=False,
             ),
             sequence(
                 "for at(station)",

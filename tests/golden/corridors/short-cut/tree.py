@@ -66,6 +66,13 @@ def all_of(*values: bool | None) -> bool | None:
     return None if None in values else True
 
 
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
+
+
 def negated(value: bool | None) -> bool | None:
     """Three-valued "not": unknown stays unknown."""
     return None if value is None else not value
@@ -292,27 +299,14 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("robot-at(lab)", lambda: robot.robot_at("lab")),
-            Latch(
-                "pass(back-door,canteen,lab)",
-                lambda: robot.do_pass("back-door", "canteen", "lab"),
-                robot.cancel,
-                guard=lambda: robot.robot_at("canteen"),
-                keep=False,
-            ),
             sequence(
                 "sequence",
-                Condition(
-                    "(known open(lab-door) and not open(lab-door))",
-                    lambda: all_of(
-                        robot.open("lab-door") is not None,
-                        negated(robot.open("lab-door")),
-                    ),
-                ),
+                Condition("unknown open(lab-door)", lambda: robot.open("lab-door") is None),
                 Latch(
-                    "pass(canteen-door,lobby,canteen)",
-                    lambda: robot.do_pass("canteen-door", "lobby", "canteen"),
+                    "peek(lab-door,office,lab)",
+                    lambda: robot.peek("lab-door", "office", "lab"),
                     robot.cancel,
-                    guard=lambda: robot.robot_at("lobby"),
+                    guard=lambda: robot.robot_at("office"),
                     keep=False,
                 ),
             ),
@@ -330,24 +324,23 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
-            sequence(
-                "for known open(lab-door)",
-                Condition("unknown open(lab-door)", lambda: robot.open("lab-door") is None),
-                Latch(
-                    "peek(lab-door,office,lab)",
-                    lambda: robot.peek("lab-door", "office", "lab"),
-                    robot.cancel,
-                    guard=lambda: robot.robot_at("office"),
-                    keep=False,
-                ),
+            Latch(
+                "pass(back-door,canteen,lab)",
+                lambda: robot.do_pass("back-door", "canteen", "lab"),
+                robot.cancel,
+                guard=lambda: robot.robot_at("canteen"),
+                keep=False,
             ),
             sequence(
                 "sequence",
                 Condition(
-                    "(known open(office-door) and not open(office-door))",
-                    lambda: all_of(
-                        robot.open("office-door") is not None,
-                        negated(robot.open("office-door")),
+                    "((known open(lab-door) and not open(lab-door)) or (known op…",
+                    lambda: any_of(
+                        all_of(robot.open("lab-door") is not None, negated(robot.open("lab-door"))),
+                        all_of(
+                            robot.open("office-door") is not None,
+                            negated(robot.open("office-door")),
+                        ),
                     ),
                 ),
                 Latch(

@@ -311,16 +311,6 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: all_of(robot.carrying("bill"), robot.at("reception")),
                 keep=False,
             ),
-            sequence(
-                "for at(reception)",
-                Condition("not at(reception)", lambda: negated(robot.at("reception"))),
-                Latch(
-                    "go_to(reception)",
-                    lambda: robot.go_to("reception"),
-                    robot.cancel,
-                    keep=False,
-                ),
-            ),
             Latch(
                 "leave(vase,reception)",
                 lambda: robot.leave("vase", "reception"),
@@ -331,6 +321,16 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.staffed("reception"),
                 ),
                 keep=False,
+            ),
+            sequence(
+                "for at(reception)",
+                Condition("not at(reception)", lambda: negated(robot.at("reception"))),
+                Latch(
+                    "go_to(reception)",
+                    lambda: robot.go_to("reception"),
+                    robot.cancel,
+                    keep=False,
+                ),
             ),
             Latch(
                 "ring_bell(reception)",

@@ -358,17 +358,6 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "call_lift(hall)",
-                lambda: robot.call_lift("hall"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.at("hall"),
-                    robot.lift_works(),
-                    negated(robot.lift_at("hall")),
-                ),
-                keep=False,
-            ),
-            Latch(
                 "call_lift(landing)",
                 lambda: robot.call_lift("landing"),
                 robot.cancel,
@@ -387,6 +376,17 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
+                "hand_over(insulin,olga,children)",
+                lambda: robot.hand_over("insulin", "olga", "children"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.on_tray("insulin"),
+                    robot.present("olga"),
+                ),
+                keep=False,
+            ),
+            Latch(
                 "page(olga,children)",
                 lambda: robot.page("olga", "children"),
                 robot.cancel,
@@ -394,10 +394,15 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "charge(hall)",
-                lambda: robot.charge("hall"),
+                "pick_up(insulin,children)",
+                lambda: robot.pick_up("insulin", "children"),
                 robot.cancel,
-                guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
+                guard=lambda: all_of(
+                    robot.at("children"),
+                    robot.lies_in("insulin", "children"),
+                    negated(robot.on_tray("insulin")),
+                    negated(robot.battery_low()),
+                ),
                 keep=False,
             ),
             Latch(
@@ -407,14 +412,42 @@ def create_root(robot: Robot) -> Behaviour:
                 guard=lambda: all_of(robot.at("landing"), robot.battery_low()),
                 keep=False,
             ),
+            sequence(
+                "for at(children)",
+                Condition(
+                    "not lies_in(insulin,hall)",
+                    lambda: negated(robot.lies_in("insulin", "hall")),
+                ),
+                Latch(
+                    "drive(children_door,landing,children)",
+                    lambda: robot.drive("children_door", "landing", "children"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
+                    keep=False,
+                ),
+            ),
             Latch(
-                "hand_over(insulin,olga,children)",
-                lambda: robot.hand_over("insulin", "olga", "children"),
+                "push(children_door,landing)",
+                lambda: robot.push("children_door", "landing"),
                 robot.cancel,
                 guard=lambda: all_of(
-                    robot.at("children"),
-                    robot.on_tray("insulin"),
-                    robot.present("olga"),
+                    robot.at("landing"),
+                    negated(robot.open("children_door")),
+                    any_of(
+                        negated(robot.bolted("children_door")),
+                        robot.bolted("children_door") is None,
+                    ),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "call_lift(hall)",
+                lambda: robot.call_lift("hall"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("hall"),
+                    robot.lift_works(),
+                    negated(robot.lift_at("hall")),
                 ),
                 keep=False,
             ),
@@ -443,20 +476,6 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "push(children_door,landing)",
-                lambda: robot.push("children_door", "landing"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.at("landing"),
-                    negated(robot.open("children_door")),
-                    any_of(
-                        negated(robot.bolted("children_door")),
-                        robot.bolted("children_door") is None,
-                    ),
-                ),
-                keep=False,
-            ),
-            Latch(
                 "ring(children_door,landing)",
                 lambda: robot.ring("children_door", "landing"),
                 robot.cancel,
@@ -468,15 +487,22 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "pick_up(insulin,children)",
-                lambda: robot.pick_up("insulin", "children"),
+                "ride(landing,hall)",
+                lambda: robot.ride("landing", "hall"),
                 robot.cancel,
                 guard=lambda: all_of(
-                    robot.at("children"),
-                    robot.lies_in("insulin", "children"),
-                    negated(robot.on_tray("insulin")),
+                    robot.at("landing"),
+                    robot.lift_at("landing"),
+                    robot.lift_works(),
                     negated(robot.battery_low()),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "charge(hall)",
+                lambda: robot.charge("hall"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
                 keep=False,
             ),
             Latch(
@@ -508,32 +534,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.at("children"),
                     negated(robot.open("children_door")),
                     robot.bolted("children_door"),
-                ),
-                keep=False,
-            ),
-            sequence(
-                "for at(children)",
-                Condition(
-                    "not lies_in(insulin,hall)",
-                    lambda: negated(robot.lies_in("insulin", "hall")),
-                ),
-                Latch(
-                    "drive(children_door,landing,children)",
-                    lambda: robot.drive("children_door", "landing", "children"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
-                    keep=False,
-                ),
-            ),
-            Latch(
-                "ride(landing,hall)",
-                lambda: robot.ride("landing", "hall"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.at("landing"),
-                    robot.lift_at("landing"),
-                    robot.lift_works(),
-                    negated(robot.battery_low()),
                 ),
                 keep=False,
             ),

@@ -537,20 +537,6 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
                 keep=False,
             ),
-            sequence(
-                "for at(hall)",
-                Condition(
-                    "not lies_in(saline,surgery)",
-                    lambda: negated(robot.lies_in("saline", "surgery")),
-                ),
-                Latch(
-                    "drive(surgery_door,surgery,hall)",
-                    lambda: robot.drive("surgery_door", "surgery", "hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.at("surgery"), robot.open("surgery_door")),
-                    keep=False,
-                ),
-            ),
             Latch(
                 "ring(surgery_door,surgery)",
                 lambda: robot.ring("surgery_door", "surgery"),
@@ -561,28 +547,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.bolted("surgery_door"),
                 ),
                 keep=False,
-            ),
-            sequence(
-                "for at(hall)",
-                Condition(
-                    "(not on_tray(insulin) and not given(saline))",
-                    lambda: all_of(
-                        negated(robot.on_tray("insulin")),
-                        negated(robot.given("saline")),
-                    ),
-                ),
-                Latch(
-                    "ride(landing,hall)",
-                    lambda: robot.ride("landing", "hall"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.at("landing"),
-                        robot.lift_at("landing"),
-                        robot.lift_works(),
-                        negated(robot.battery_low()),
-                    ),
-                    keep=False,
-                ),
             ),
             Latch(
                 "ring(children_door,children)",
@@ -718,8 +682,11 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "for at(hall)",
                 Condition(
-                    "not lies_in(insulin,children)",
-                    lambda: negated(robot.lies_in("insulin", "children")),
+                    "(not given(saline) or not lies_in(insulin,children))",
+                    lambda: any_of(
+                        negated(robot.given("saline")),
+                        negated(robot.lies_in("insulin", "children")),
+                    ),
                 ),
                 Latch(
                     "ride(landing,hall)",

@@ -317,13 +317,6 @@ def create_root(robot: Robot) -> Behaviour:
                 "(known in_range(pressure) and at(pump_hall))",
                 lambda: all_of(robot.in_range("pressure") is not None, robot.at("pump_hall")),
             ),
-            Latch(
-                "drive(boiler_room)",
-                lambda: robot.drive("boiler_room"),
-                robot.cancel,
-                guard=lambda: negated(robot.at("boiler_room")),
-                keep=False,
-            ),
             sequence(
                 "for at(pump_hall)",
                 Condition(
@@ -347,6 +340,13 @@ def create_root(robot: Robot) -> Behaviour:
                     any_of(robot.lit("boiler_room"), robot.torch_on()),
                     robot.lens_clean(),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "drive(boiler_room)",
+                lambda: robot.drive("boiler_room"),
+                robot.cancel,
+                guard=lambda: negated(robot.at("boiler_room")),
                 keep=False,
             ),
             sequence(

@@ -320,114 +320,12 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.packed("chocolates", "crate1"),
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "((unknown holding(chocolates) or holding(chocolates) or not…",
-                    lambda: all_of(
-                        any_of(
-                            robot.holding("chocolates") is None,
-                            robot.holding("chocolates"),
-                            negated(robot.lost("chocolates")),
-                            robot.packed("chocolates", "crate1"),
-                        ),
-                        any_of(
-                            robot.holding("wine") is None,
-                            robot.holding("wine"),
-                            negated(robot.lost("wine")),
-                            robot.packed("wine", "crate1"),
-                        ),
-                    ),
-                ),
-                fallback(
-                    "fallback",
-                    Latch(
-                        "read_force_sensor(chocolates)",
-                        lambda: robot.read_force_sensor("chocolates"),
-                        robot.cancel,
-                        guard=lambda: robot.holding("chocolates") is None,
-                        keep=False,
-                    ),
-                    Latch(
-                        "place(chocolates,crate1)",
-                        lambda: robot.place("chocolates", "crate1"),
-                        robot.cancel,
-                        guard=lambda: robot.holding("chocolates"),
-                        keep=False,
-                    ),
-                    Latch(
-                        "read_force_sensor(wine)",
-                        lambda: robot.read_force_sensor("wine"),
-                        robot.cancel,
-                        guard=lambda: robot.holding("wine") is None,
-                        keep=False,
-                    ),
-                    Latch(
-                        "place(wine,crate1)",
-                        lambda: robot.place("wine", "crate1"),
-                        robot.cancel,
-                        guard=lambda: robot.holding("wine"),
-                        keep=False,
-                    ),
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "not packed(chocolates,crate1)",
-                            lambda: negated(robot.packed("chocolates", "crate1")),
-                        ),
-                        Latch(
-                            "pick(chocolates)",
-                            lambda: robot.pick("chocolates"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                robot.gripper_free(),
-                                robot.in_view("chocolates"),
-                                negated(robot.holding("chocolates")),
-                                negated(robot.lost("chocolates")),
-                            ),
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
-                        "look_for(wine)",
-                        lambda: robot.look_for("wine"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            negated(robot.in_view("wine")),
-                            negated(robot.lost("wine")),
-                        ),
-                        keep=False,
-                    ),
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "not packed(wine,crate1)",
-                            lambda: negated(robot.packed("wine", "crate1")),
-                        ),
-                        Latch(
-                            "pick(wine)",
-                            lambda: robot.pick("wine"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                robot.gripper_free(),
-                                robot.in_view("wine"),
-                                negated(robot.holding("wine")),
-                                negated(robot.lost("wine")),
-                            ),
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
-                        "look_for(chocolates)",
-                        lambda: robot.look_for("chocolates"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            negated(robot.in_view("chocolates")),
-                            negated(robot.lost("chocolates")),
-                        ),
-                        keep=False,
-                    ),
-                ),
+            Latch(
+                "read_force_sensor(chocolates)",
+                lambda: robot.read_force_sensor("chocolates"),
+                robot.cancel,
+                guard=lambda: robot.holding("chocolates") is None,
+                keep=False,
             ),
             Latch(
                 "place(chocolates,crate1)",
@@ -437,11 +335,32 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
+                "read_force_sensor(wine)",
+                lambda: robot.read_force_sensor("wine"),
+                robot.cancel,
+                guard=lambda: robot.holding("wine") is None,
+                keep=False,
+            ),
+            Latch(
                 "place(wine,crate1)",
                 lambda: robot.place("wine", "crate1"),
                 robot.cancel,
                 guard=lambda: robot.holding("wine"),
                 keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition("packed(wine,crate1)", lambda: robot.packed("wine", "crate1")),
+                Latch(
+                    "look_for(chocolates)",
+                    lambda: robot.look_for("chocolates"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        negated(robot.in_view("chocolates")),
+                        negated(robot.lost("chocolates")),
+                    ),
+                    keep=False,
+                ),
             ),
             Latch(
                 "look_for(wine)",
@@ -449,6 +368,47 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(negated(robot.in_view("wine")), negated(robot.lost("wine"))),
                 keep=False,
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "not packed(chocolates,crate1)",
+                    lambda: negated(robot.packed("chocolates", "crate1")),
+                ),
+                Latch(
+                    "pick(chocolates)",
+                    lambda: robot.pick("chocolates"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.gripper_free(),
+                        robot.in_view("chocolates"),
+                        negated(robot.holding("chocolates")),
+                        negated(robot.lost("chocolates")),
+                    ),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition(
+                    "(not lost(chocolates) or packed(chocolates,crate1))",
+                    lambda: any_of(
+                        negated(robot.lost("chocolates")),
+                        robot.packed("chocolates", "crate1"),
+                    ),
+                ),
+                Latch(
+                    "pick(wine)",
+                    lambda: robot.pick("wine"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.gripper_free(),
+                        robot.in_view("wine"),
+                        negated(robot.holding("wine")),
+                        negated(robot.lost("wine")),
+                    ),
+                    keep=False,
+                ),
             ),
             sequence(
                 "for in_view(chocolates)",
@@ -465,25 +425,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.cancel,
                     guard=lambda: all_of(
                         negated(robot.in_view("chocolates")),
-                        negated(robot.lost("chocolates")),
-                    ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "sequence",
-                Condition(
-                    "not packed(chocolates,crate1)",
-                    lambda: negated(robot.packed("chocolates", "crate1")),
-                ),
-                Latch(
-                    "pick(chocolates)",
-                    lambda: robot.pick("chocolates"),
-                    robot.cancel,
-                    guard=lambda: all_of(
-                        robot.gripper_free(),
-                        robot.in_view("chocolates"),
-                        negated(robot.holding("chocolates")),
                         negated(robot.lost("chocolates")),
                     ),
                     keep=False,

@@ -317,13 +317,6 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "look_for(water)",
-                lambda: robot.look_for("water"),
-                robot.cancel,
-                guard=lambda: all_of(negated(robot.in_view("water")), negated(robot.lost("water"))),
-                keep=False,
-            ),
-            Latch(
                 "pick(water)",
                 lambda: robot.pick("water"),
                 robot.cancel,
@@ -333,6 +326,13 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.holding("water")),
                     negated(robot.lost("water")),
                 ),
+                keep=False,
+            ),
+            Latch(
+                "look_for(water)",
+                lambda: robot.look_for("water"),
+                robot.cancel,
+                guard=lambda: all_of(negated(robot.in_view("water")), negated(robot.lost("water"))),
                 keep=False,
             ),
         ),

@@ -84,6 +84,13 @@ def all_of(*values: bool | None) -> bool | None:
     return None if None in values else True
 
 
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
+
+
 def negated(value: bool | None) -> bool | None:
     """Three-valued "not": unknown stays unknown."""
     return None if value is None else not value
@@ -319,20 +326,6 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             Latch(
-                "look_for(book3,counter5)",
-                lambda: robot.look_for("book3", "counter5"),
-                robot.cancel,
-                guard=lambda: all_of(robot.near("counter5"), robot.at("book3", "counter5") is None),
-                keep=False,
-            ),
-            Latch(
-                "look_for(book3,shelf3)",
-                lambda: robot.look_for("book3", "shelf3"),
-                robot.cancel,
-                guard=lambda: all_of(robot.near("shelf3"), robot.at("book3", "shelf3") is None),
-                keep=False,
-            ),
-            Latch(
                 "look_for(book3,cupboard4)",
                 lambda: robot.look_for("book3", "cupboard4"),
                 robot.cancel,
@@ -340,17 +333,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.near("cupboard4"),
                     robot.at("book3", "cupboard4") is None,
                     robot.is_open("cupboard4"),
-                ),
-                keep=False,
-            ),
-            Latch(
-                "open(drawer6)",
-                lambda: robot.open("drawer6"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.near("drawer6"),
-                    negated(robot.is_open("drawer6")),
-                    robot.hand_free(),
                 ),
                 keep=False,
             ),
@@ -365,36 +347,56 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
                 keep=False,
             ),
-            sequence(
-                "for near(shelf3)",
-                Condition(
-                    "(not near(cupboard4) and not hand_free() and not holding(pl…",
-                    lambda: all_of(
-                        negated(robot.near("cupboard4")),
-                        negated(robot.hand_free()),
-                        negated(robot.holding("plate2")),
-                        robot.is_open("fridge2"),
-                    ),
+            Latch(
+                "place(cup1,cupboard4)",
+                lambda: robot.place("cup1", "cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    robot.holding("cup1"),
+                    robot.is_open("cupboard4"),
                 ),
-                Latch(
-                    "walk(shelf3)",
-                    lambda: robot.walk("shelf3"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.near("shelf3")),
-                    keep=False,
-                ),
+                keep=False,
+            ),
+            Latch(
+                "look_for(book3,counter5)",
+                lambda: robot.look_for("book3", "counter5"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("counter5"), robot.at("book3", "counter5") is None),
+                keep=False,
+            ),
+            Latch(
+                "look_for(book3,shelf3)",
+                lambda: robot.look_for("book3", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("shelf3"), robot.at("book3", "shelf3") is None),
+                keep=False,
             ),
             sequence(
                 "for near(drawer6)",
                 Condition(
-                    "(hand_free() and not open(drawer6) and not near(cupboard4))",
-                    lambda: all_of(
-                        robot.hand_free(),
-                        negated(robot.is_open("drawer6")),
-                        negated(robot.near("cupboard4")),
+                    "((hand_free() and not open(drawer6) and not near(cupboard4)…",
+                    lambda: any_of(
+                        all_of(
+                            robot.hand_free(),
+                            negated(robot.is_open("drawer6")),
+                            negated(robot.near("cupboard4")),
+                        ),
+                        all_of(
+                            robot.is_open("drawer6"),
+                            robot.holding("book3"),
+                            robot.at("cup1", "shelf3") is not None,
+                            negated(robot.at("cup1", "shelf3")),
+                        ),
                     ),
                 ),
-                Latch("walk(drawer6)", lambda: robot.walk("drawer6"), robot.cancel, keep=False),
+                Latch(
+                    "walk(drawer6)",
+                    lambda: robot.walk("drawer6"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("drawer6")),
+                    keep=False,
+                ),
             ),
             Latch(
                 "place(plate2,fridge2)",
@@ -404,6 +406,17 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.near("fridge2"),
                     robot.holding("plate2"),
                     robot.is_open("fridge2"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "open(drawer6)",
+                lambda: robot.open("drawer6"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("drawer6"),
+                    negated(robot.is_open("drawer6")),
+                    robot.hand_free(),
                 ),
                 keep=False,
             ),
@@ -420,46 +433,6 @@ def create_root(robot: Robot) -> Behaviour:
                     guard=lambda: negated(robot.near("table1")),
                     keep=False,
                 ),
-            ),
-            sequence(
-                "for near(shelf3)",
-                Condition(
-                    "(known at(cup1,shelf3) and at(cup1,shelf3) and open(cupboar…",
-                    lambda: all_of(
-                        robot.at("cup1", "shelf3") is not None,
-                        robot.at("cup1", "shelf3"),
-                        robot.is_open("cupboard4"),
-                    ),
-                ),
-                Latch(
-                    "walk(shelf3)",
-                    lambda: robot.walk("shelf3"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.near("shelf3")),
-                    keep=False,
-                ),
-            ),
-            Latch(
-                "open(cupboard4)",
-                lambda: robot.open("cupboard4"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.near("cupboard4"),
-                    negated(robot.is_open("cupboard4")),
-                    robot.hand_free(),
-                ),
-                keep=False,
-            ),
-            Latch(
-                "place(cup1,cupboard4)",
-                lambda: robot.place("cup1", "cupboard4"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.near("cupboard4"),
-                    robot.holding("cup1"),
-                    robot.is_open("cupboard4"),
-                ),
-                keep=False,
             ),
             Latch(
                 "place(plate2,shelf3)",
@@ -478,10 +451,14 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "for near(shelf3)",
                 Condition(
-                    "(not hand_free() and unknown at(book3,cupboard4))",
-                    lambda: all_of(
-                        negated(robot.hand_free()),
-                        robot.at("book3", "cupboard4") is None,
+                    "((known at(cup1,shelf3) and at(cup1,shelf3) and open(cupboa…",
+                    lambda: any_of(
+                        all_of(
+                            robot.at("cup1", "shelf3") is not None,
+                            robot.at("cup1", "shelf3"),
+                            robot.is_open("cupboard4"),
+                        ),
+                        all_of(negated(robot.hand_free()), robot.at("book3", "cupboard4") is None),
                     ),
                 ),
                 Latch(
@@ -512,56 +489,17 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "for near(shelf3)",
-                Condition(
-                    "(known at(cup1,fridge2) and not at(cup1,fridge2) and near(f…",
-                    lambda: all_of(
-                        robot.at("cup1", "fridge2") is not None,
-                        negated(robot.at("cup1", "fridge2")),
-                        robot.near("fridge2"),
-                    ),
-                ),
-                Latch(
-                    "walk(shelf3)",
-                    lambda: robot.walk("shelf3"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.near("shelf3")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "for near(drawer6)",
-                Condition(
-                    "(open(drawer6) and holding(book3) and known at(cup1,shelf3)…",
-                    lambda: all_of(
-                        robot.is_open("drawer6"),
-                        robot.holding("book3"),
-                        robot.at("cup1", "shelf3") is not None,
-                        negated(robot.at("cup1", "shelf3")),
-                    ),
-                ),
-                Latch("walk(drawer6)", lambda: robot.walk("drawer6"), robot.cancel, keep=False),
-            ),
-            Latch(
-                "place(book3,cupboard4)",
-                lambda: robot.place("book3", "cupboard4"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.near("cupboard4"),
-                    robot.holding("book3"),
-                    robot.is_open("cupboard4"),
-                ),
-                keep=False,
-            ),
-            sequence(
                 "for near(cupboard4)",
                 Condition(
-                    "(known at(cup1,shelf3) and not at(cup1,shelf3) and not hand…",
-                    lambda: all_of(
-                        robot.at("cup1", "shelf3") is not None,
-                        negated(robot.at("cup1", "shelf3")),
-                        negated(robot.hand_free()),
-                        robot.is_open("cupboard4"),
+                    "((known at(cup1,shelf3) and not at(cup1,shelf3) and not han…",
+                    lambda: any_of(
+                        all_of(
+                            robot.at("cup1", "shelf3") is not None,
+                            negated(robot.at("cup1", "shelf3")),
+                            negated(robot.hand_free()),
+                            robot.is_open("cupboard4"),
+                        ),
+                        all_of(negated(robot.is_open("cupboard4")), robot.hand_free()),
                     ),
                 ),
                 Latch(
@@ -571,14 +509,6 @@ def create_root(robot: Robot) -> Behaviour:
                     guard=lambda: negated(robot.near("cupboard4")),
                     keep=False,
                 ),
-            ),
-            sequence(
-                "for near(cupboard4)",
-                Condition(
-                    "(not open(cupboard4) and hand_free())",
-                    lambda: all_of(negated(robot.is_open("cupboard4")), robot.hand_free()),
-                ),
-                Latch("walk(cupboard4)", lambda: robot.walk("cupboard4"), robot.cancel, keep=False),
             ),
             Latch(
                 "pick(cup1,table1)",
@@ -612,113 +542,6 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.at("cup1", "shelf3"),
                     robot.hand_free(),
                 ),
-                keep=False,
-            ),
-            sequence(
-                "for near(shelf3)",
-                Condition(
-                    "(known at(book3,shelf3) and at(book3,shelf3))",
-                    lambda: all_of(
-                        robot.at("book3", "shelf3") is not None,
-                        robot.at("book3", "shelf3"),
-                    ),
-                ),
-                Latch(
-                    "walk(shelf3)",
-                    lambda: robot.walk("shelf3"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.near("shelf3")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "for near(table1)",
-                Condition(
-                    "(known at(cup1,table1) and at(cup1,table1) and hand_free() …",
-                    lambda: all_of(
-                        robot.at("cup1", "table1") is not None,
-                        robot.at("cup1", "table1"),
-                        robot.hand_free(),
-                        robot.is_open("fridge2"),
-                    ),
-                ),
-                Latch("walk(table1)", lambda: robot.walk("table1"), robot.cancel, keep=False),
-            ),
-            Latch(
-                "place(cup1,shelf3)",
-                lambda: robot.place("cup1", "shelf3"),
-                robot.cancel,
-                guard=lambda: all_of(robot.near("shelf3"), robot.holding("cup1")),
-                keep=False,
-            ),
-            Latch(
-                "place(plate2,cupboard4)",
-                lambda: robot.place("plate2", "cupboard4"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    robot.near("cupboard4"),
-                    robot.holding("plate2"),
-                    robot.is_open("cupboard4"),
-                ),
-                keep=False,
-            ),
-            sequence(
-                "for hand_free()",
-                Condition("not open(drawer6)", lambda: negated(robot.is_open("drawer6"))),
-                Latch(
-                    "place(book3,shelf3)",
-                    lambda: robot.place("book3", "shelf3"),
-                    robot.cancel,
-                    guard=lambda: all_of(robot.near("shelf3"), robot.holding("book3")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "for near(fridge2)",
-                Condition("near(table1)", lambda: robot.near("table1")),
-                Latch(
-                    "walk(fridge2)",
-                    lambda: robot.walk("fridge2"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.near("fridge2")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "for near(drawer6)",
-                Condition("not open(drawer6)", lambda: negated(robot.is_open("drawer6"))),
-                Latch(
-                    "walk(drawer6)",
-                    lambda: robot.walk("drawer6"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.near("drawer6")),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "for near(drawer6)",
-                Condition(
-                    "(known at(book3,drawer6) and not at(book3,drawer6) and know…",
-                    lambda: all_of(
-                        robot.at("book3", "drawer6") is not None,
-                        negated(robot.at("book3", "drawer6")),
-                        robot.at("cup1", "shelf3") is not None,
-                        robot.at("cup1", "shelf3"),
-                    ),
-                ),
-                Latch(
-                    "walk(drawer6)",
-                    lambda: robot.walk("drawer6"),
-                    robot.cancel,
-                    guard=lambda: negated(robot.near("drawer6")),
-                    keep=False,
-                ),
-            ),
-            Latch(
-                "place(book3,shelf3)",
-                lambda: robot.place("book3", "shelf3"),
-                robot.cancel,
-                guard=lambda: all_of(robot.near("shelf3"), robot.holding("book3")),
                 keep=False,
             ),
             sequence(
@@ -763,20 +586,76 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
+            Latch(
+                "place(plate2,cupboard4)",
+                lambda: robot.place("plate2", "cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    robot.holding("plate2"),
+                    robot.is_open("cupboard4"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "open(cupboard4)",
+                lambda: robot.open("cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    negated(robot.is_open("cupboard4")),
+                    robot.hand_free(),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "place(book3,cupboard4)",
+                lambda: robot.place("book3", "cupboard4"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.near("cupboard4"),
+                    robot.holding("book3"),
+                    robot.is_open("cupboard4"),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "place(cup1,shelf3)",
+                lambda: robot.place("cup1", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("shelf3"), robot.holding("cup1")),
+                keep=False,
+            ),
             sequence(
-                "for near(cupboard4)",
+                "for hand_free()",
+                Condition("not open(drawer6)", lambda: negated(robot.is_open("drawer6"))),
+                Latch(
+                    "place(book3,shelf3)",
+                    lambda: robot.place("book3", "shelf3"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.near("shelf3"), robot.holding("book3")),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "for near(drawer6)",
                 Condition(
-                    "(known at(cup1,cupboard4) and at(cup1,cupboard4))",
-                    lambda: all_of(
-                        robot.at("cup1", "cupboard4") is not None,
-                        robot.at("cup1", "cupboard4"),
+                    "(not open(drawer6) or (known at(book3,drawer6) and not at(b…",
+                    lambda: any_of(
+                        negated(robot.is_open("drawer6")),
+                        all_of(
+                            robot.at("book3", "drawer6") is not None,
+                            negated(robot.at("book3", "drawer6")),
+                            robot.at("cup1", "shelf3") is not None,
+                            robot.at("cup1", "shelf3"),
+                        ),
                     ),
                 ),
                 Latch(
-                    "walk(cupboard4)",
-                    lambda: robot.walk("cupboard4"),
+                    "walk(drawer6)",
+                    lambda: robot.walk("drawer6"),
                     robot.cancel,
-                    guard=lambda: negated(robot.near("cupboard4")),
+                    guard=lambda: negated(robot.near("drawer6")),
                     keep=False,
                 ),
             ),
@@ -802,6 +681,13 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
+            Latch(
+                "place(book3,shelf3)",
+                lambda: robot.place("book3", "shelf3"),
+                robot.cancel,
+                guard=lambda: all_of(robot.near("shelf3"), robot.holding("book3")),
+                keep=False,
+            ),
             sequence(
                 "for near(drawer6)",
                 Condition(
@@ -821,8 +707,23 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "for near(shelf3)",
-                Condition("unknown at(book3,shelf3)", lambda: robot.at("book3", "shelf3") is None),
-                Latch("walk(shelf3)", lambda: robot.walk("shelf3"), robot.cancel, keep=False),
+                Condition(
+                    "((known at(book3,shelf3) and at(book3,shelf3)) or unknown a…",
+                    lambda: any_of(
+                        all_of(
+                            robot.at("book3", "shelf3") is not None,
+                            robot.at("book3", "shelf3"),
+                        ),
+                        robot.at("book3", "shelf3") is None,
+                    ),
+                ),
+                Latch(
+                    "walk(shelf3)",
+                    lambda: robot.walk("shelf3"),
+                    robot.cancel,
+                    guard=lambda: negated(robot.near("shelf3")),
+                    keep=False,
+                ),
             ),
             Latch(
                 "walk(counter5)",
@@ -834,10 +735,13 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "for near(cupboard4)",
                 Condition(
-                    "(known at(book3,cupboard4) and at(book3,cupboard4))",
-                    lambda: all_of(
-                        robot.at("book3", "cupboard4") is not None,
-                        robot.at("book3", "cupboard4"),
+                    "((known at(book3,cupboard4) and at(book3,cupboard4)) or unk…",
+                    lambda: any_of(
+                        all_of(
+                            robot.at("book3", "cupboard4") is not None,
+                            robot.at("book3", "cupboard4"),
+                        ),
+                        robot.at("book3", "cupboard4") is None,
                     ),
                 ),
                 Latch(
@@ -851,8 +755,14 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "for near(cupboard4)",
                 Condition(
-                    "unknown at(book3,cupboard4)",
-                    lambda: robot.at("book3", "cupboard4") is None,
+                    "(open(fridge2) or (known at(cup1,cupboard4) and at(cup1,cup…",
+                    lambda: any_of(
+                        robot.is_open("fridge2"),
+                        all_of(
+                            robot.at("cup1", "cupboard4") is not None,
+                            robot.at("cup1", "cupboard4"),
+                        ),
+                    ),
                 ),
                 Latch(
                     "walk(cupboard4)",

@@ -70,6 +70,13 @@ def all_of(*values: bool | None) -> bool | None:
     return None if None in values else True
 
 
+def any_of(*values: bool | None) -> bool | None:
+    """Three-valued "or": True if any value is True, else None if any is unknown, else False."""
+    if True in values:
+        return True
+    return None if None in values else False
+
+
 def negated(value: bool | None) -> bool | None:
     """Three-valued "not": unknown stays unknown."""
     return None if value is None else not value
@@ -314,23 +321,6 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
-                Condition(
-                    "(known tin-at(right) and tin-at(right))",
-                    lambda: all_of(
-                        robot.monitor.value("tin-at", "right") is not None,
-                        robot.monitor.value("tin-at", "right"),
-                    ),
-                ),
-                Latch(
-                    "drive(middle,right)",
-                    lambda: robot.drive("middle", "right"),
-                    robot.cancel,
-                    guard=lambda: robot.robot_at("middle"),
-                    keep=False,
-                ),
-            ),
-            sequence(
                 "for holding()",
                 Condition(
                     "(known tin-at(right) and tin-at(right))",
@@ -351,23 +341,6 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "sequence",
-                Condition(
-                    "(known tin-at(right) and not tin-at(right))",
-                    lambda: all_of(
-                        robot.monitor.value("tin-at", "right") is not None,
-                        negated(robot.monitor.value("tin-at", "right")),
-                    ),
-                ),
-                Latch(
-                    "drive(right,middle)",
-                    lambda: robot.drive("right", "middle"),
-                    robot.cancel,
-                    guard=lambda: robot.robot_at("right"),
-                    keep=False,
-                ),
-            ),
-            sequence(
                 "for robot-at(right)",
                 Condition(
                     "(known tin-at(right) and tin-at(right))",
@@ -383,15 +356,6 @@ def create_root(robot: Robot) -> Behaviour:
                     guard=lambda: robot.robot_at("left"),
                     keep=False,
                 ),
-            ),
-            Latch(
-                "look(left)",
-                *watched(robot, ("look", "left"), lambda: robot.look("left")),
-                guard=lambda: all_of(
-                    robot.robot_at("left"),
-                    robot.monitor.value("tin-at", "left") is None,
-                ),
-                keep=False,
             ),
             sequence(
                 "for holding()",
@@ -410,23 +374,6 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.monitor.value("holding")),
                         negated(robot.monitor.value("spilt")),
                     ),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "for robot-at(left)",
-                Condition(
-                    "(known tin-at(middle) and not tin-at(middle))",
-                    lambda: all_of(
-                        robot.monitor.value("tin-at", "middle") is not None,
-                        negated(robot.monitor.value("tin-at", "middle")),
-                    ),
-                ),
-                Latch(
-                    "drive(middle,left)",
-                    lambda: robot.drive("middle", "left"),
-                    robot.cancel,
-                    guard=lambda: robot.robot_at("middle"),
                     keep=False,
                 ),
             ),
@@ -450,18 +397,51 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
-            Latch(
-                "drive(left,right)",
-                lambda: robot.drive("left", "right"),
-                robot.cancel,
-                guard=lambda: robot.robot_at("left"),
-                keep=False,
+            sequence(
+                "for robot-at(middle)",
+                Condition(
+                    "(known tin-at(right) and not tin-at(right))",
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "right") is not None,
+                        negated(robot.monitor.value("tin-at", "right")),
+                    ),
+                ),
+                Latch(
+                    "drive(right,middle)",
+                    lambda: robot.drive("right", "middle"),
+                    robot.cancel,
+                    guard=lambda: robot.robot_at("right"),
+                    keep=False,
+                ),
+            ),
+            sequence(
+                "for robot-at(left)",
+                Condition(
+                    "(known tin-at(middle) and not tin-at(middle))",
+                    lambda: all_of(
+                        robot.monitor.value("tin-at", "middle") is not None,
+                        negated(robot.monitor.value("tin-at", "middle")),
+                    ),
+                ),
+                Latch(
+                    "drive(middle,left)",
+                    lambda: robot.drive("middle", "left"),
+                    robot.cancel,
+                    guard=lambda: robot.robot_at("middle"),
+                    keep=False,
+                ),
             ),
             sequence(
                 "for robot-at(right)",
                 Condition(
-                    "unknown tin-at(right)",
-                    lambda: robot.monitor.value("tin-at", "right") is None,
+                    "((known tin-at(right) and tin-at(right)) or unknown tin-at(…",
+                    lambda: any_of(
+                        all_of(
+                            robot.monitor.value("tin-at", "right") is not None,
+                            robot.monitor.value("tin-at", "right"),
+                        ),
+                        robot.monitor.value("tin-at", "right") is None,
+                    ),
                 ),
                 Latch(
                     "drive(middle,right)",
@@ -483,25 +463,14 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "for robot-at(left)",
                 Condition(
-                    "(known tin-at(left) and tin-at(left))",
-                    lambda: all_of(
-                        robot.monitor.value("tin-at", "left") is not None,
-                        robot.monitor.value("tin-at", "left"),
+                    "((known tin-at(left) and tin-at(left)) or unknown tin-at(le…",
+                    lambda: any_of(
+                        all_of(
+                            robot.monitor.value("tin-at", "left") is not None,
+                            robot.monitor.value("tin-at", "left"),
+                        ),
+                        robot.monitor.value("tin-at", "left") is None,
                     ),
-                ),
-                Latch(
-                    "drive(right,left)",
-                    lambda: robot.drive("right", "left"),
-                    robot.cancel,
-                    guard=lambda: robot.robot_at("right"),
-                    keep=False,
-                ),
-            ),
-            sequence(
-                "for robot-at(left)",
-                Condition(
-                    "unknown tin-at(left)",
-                    lambda: robot.monitor.value("tin-at", "left") is None,
                 ),
                 Latch(
                     "drive(right,left)",
@@ -518,6 +487,22 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.robot_at("right"),
                     robot.monitor.value("tin-at", "right") is None,
                 ),
+                keep=False,
+            ),
+            Latch(
+                "look(left)",
+                *watched(robot, ("look", "left"), lambda: robot.look("left")),
+                guard=lambda: all_of(
+                    robot.robot_at("left"),
+                    robot.monitor.value("tin-at", "left") is None,
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(left,right)",
+                lambda: robot.drive("left", "right"),
+                robot.cancel,
+                guard=lambda: robot.robot_at("left"),
                 keep=False,
             ),
             Latch(

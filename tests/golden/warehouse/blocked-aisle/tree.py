@@ -317,23 +317,6 @@ def create_root(robot: Robot) -> Behaviour:
                 keep=False,
             ),
             Latch(
-                "drive(b1)",
-                lambda: robot.drive("b1"),
-                robot.cancel,
-                guard=lambda: all_of(
-                    negated(robot.at("b1")),
-                    any_of(
-                        robot.at("b1"),
-                        all_of(
-                            robot.at("packing"),
-                            negated(robot.blocked("packing", "b1")),
-                            negated(robot.blocked("b1", "packing")),
-                        ),
-                    ),
-                ),
-                keep=False,
-            ),
-            Latch(
                 "fetch(saw,b1)",
                 lambda: robot.fetch("saw", "b1"),
                 robot.cancel,
@@ -363,6 +346,23 @@ def create_root(robot: Robot) -> Behaviour:
                             ),
                             negated(robot.blocked("b1", "packing")),
                             negated(robot.blocked("packing", "b1")),
+                        ),
+                    ),
+                ),
+                keep=False,
+            ),
+            Latch(
+                "drive(b1)",
+                lambda: robot.drive("b1"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    negated(robot.at("b1")),
+                    any_of(
+                        robot.at("b1"),
+                        all_of(
+                            robot.at("packing"),
+                            negated(robot.blocked("packing", "b1")),
+                            negated(robot.blocked("b1", "packing")),
                         ),
                     ),
                 ),

@@ -317,13 +317,13 @@ def create_root(robot: Robot) -> Behaviour:
             sequence(
                 "sequence",
                 Condition(
-                    "(loaded(drill) or unknown stored(drill,a1) or stored(drill,…",
+                    "(unknown stored(drill,a1) or stored(drill,a1) or unknown st…",
                     lambda: any_of(
-                        robot.loaded("drill"),
                         robot.stored("drill", "a1") is None,
                         robot.stored("drill", "a1"),
                         robot.stored("drill", "a2") is None,
                         robot.stored("drill", "a2"),
+                        robot.loaded("drill"),
                     ),
                 ),
                 fallback(
@@ -340,17 +340,6 @@ def create_root(robot: Robot) -> Behaviour:
                         lambda: robot.scan("drill", "a1"),
                         robot.cancel,
                         guard=lambda: all_of(robot.at("a1"), robot.stored("drill", "a1") is None),
-                        keep=False,
-                    ),
-                    Latch(
-                        "fetch(drill,a1)",
-                        lambda: robot.fetch("drill", "a1"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            robot.at("a1"),
-                            robot.stored("drill", "a1"),
-                            negated(robot.loaded("drill")),
-                        ),
                         keep=False,
                     ),
                     sequence(
@@ -387,65 +376,21 @@ def create_root(robot: Robot) -> Behaviour:
                         ),
                     ),
                     Latch(
-                        "drive(a2)",
-                        lambda: robot.drive("a2"),
-                        robot.cancel,
-                        guard=lambda: all_of(
-                            negated(robot.at("a2")),
-                            any_of(
-                                robot.at("a2"),
-                                all_of(
-                                    any_of(
-                                        robot.at("a1"),
-                                        all_of(
-                                            robot.at("packing"),
-                                            negated(robot.blocked("packing", "a1")),
-                                            negated(robot.blocked("a1", "packing")),
-                                        ),
-                                        all_of(
-                                            robot.at("a2"),
-                                            negated(robot.blocked("a2", "a1")),
-                                            negated(robot.blocked("a1", "a2")),
-                                        ),
-                                    ),
-                                    negated(robot.blocked("a1", "a2")),
-                                    negated(robot.blocked("a2", "a1")),
-                                ),
-                            ),
-                        ),
-                        keep=False,
-                    ),
-                    sequence(
-                        "for at(a1)",
-                        Condition("at(packing)", lambda: robot.at("packing")),
-                        Latch(
-                            "drive(a1)",
-                            lambda: robot.drive("a1"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                negated(robot.at("a1")),
-                                any_of(
-                                    robot.at("a1"),
-                                    all_of(
-                                        robot.at("packing"),
-                                        negated(robot.blocked("packing", "a1")),
-                                        negated(robot.blocked("a1", "packing")),
-                                    ),
-                                    all_of(
-                                        robot.at("a2"),
-                                        negated(robot.blocked("a2", "a1")),
-                                        negated(robot.blocked("a1", "a2")),
-                                    ),
-                                ),
-                            ),
-                            keep=False,
-                        ),
-                    ),
-                    Latch(
                         "scan(drill,a2)",
                         lambda: robot.scan("drill", "a2"),
                         robot.cancel,
                         guard=lambda: all_of(robot.at("a2"), robot.stored("drill", "a2") is None),
+                        keep=False,
+                    ),
+                    Latch(
+                        "fetch(drill,a1)",
+                        lambda: robot.fetch("drill", "a1"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            robot.at("a1"),
+                            robot.stored("drill", "a1"),
+                            negated(robot.loaded("drill")),
+                        ),
                         keep=False,
                     ),
                     Latch(
@@ -481,25 +426,61 @@ def create_root(robot: Robot) -> Behaviour:
                         ),
                         keep=False,
                     ),
+                    Latch(
+                        "drive(a2)",
+                        lambda: robot.drive("a2"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            negated(robot.at("a2")),
+                            any_of(
+                                robot.at("a2"),
+                                all_of(
+                                    any_of(
+                                        robot.at("a1"),
+                                        all_of(
+                                            robot.at("packing"),
+                                            negated(robot.blocked("packing", "a1")),
+                                            negated(robot.blocked("a1", "packing")),
+                                        ),
+                                        all_of(
+                                            robot.at("a2"),
+                                            negated(robot.blocked("a2", "a1")),
+                                            negated(robot.blocked("a1", "a2")),
+                                        ),
+                                    ),
+                                    negated(robot.blocked("a1", "a2")),
+                                    negated(robot.blocked("a2", "a1")),
+                                ),
+                            ),
+                        ),
+                        keep=False,
+                    ),
                 ),
             ),
             Latch(
-                "drive(a1)",
-                lambda: robot.drive("a1"),
+                "drive(a2)",
+                lambda: robot.drive("a2"),
                 robot.cancel,
                 guard=lambda: all_of(
-                    negated(robot.at("a1")),
+                    negated(robot.at("a2")),
                     any_of(
-                        robot.at("a1"),
+                        robot.at("a2"),
                         all_of(
-                            robot.at("packing"),
-                            negated(robot.blocked("packing", "a1")),
-                            negated(robot.blocked("a1", "packing")),
-                        ),
-                        all_of(
-                            robot.at("a2"),
-                            negated(robot.blocked("a2", "a1")),
+                            any_of(
+                                robot.at("a1"),
+                                all_of(
+                                    robot.at("packing"),
+                                    negated(robot.blocked("packing", "a1")),
+                                    negated(robot.blocked("a1", "packing")),
+                                ),
+                                all_of(
+                                    robot.at("a2"),
+                                    negated(robot.blocked("a2", "a1")),
+                                    negated(robot.blocked("a1", "a2")),
+                                ),
+                            ),
                             negated(robot.blocked("a1", "a2")),
+                            negated(robot.blocked("a2", "a1")),
                         ),
                     ),
                 ),
@@ -507,10 +488,7 @@ def create_root(robot: Robot) -> Behaviour:
             ),
             sequence(
                 "for at(packing)",
-                Condition(
-                    "(blocked(a1,a2) or blocked(a2,a1))",
-                    lambda: any_of(robot.blocked("a1", "a2"), robot.blocked("a2", "a1")),
-                ),
+                Condition("at(a1)", lambda: robot.at("a1")),
                 Latch(
                     "drive(packing)",
                     lambda: robot.drive("packing"),
@@ -542,35 +520,32 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
             ),
             sequence(
-                "for at(a2)",
+                "for at(a1)",
                 Condition(
-                    "(blocked(a1,packing) or blocked(packing,a1))",
-                    lambda: any_of(robot.blocked("a1", "packing"), robot.blocked("packing", "a1")),
+                    "(at(packing) or blocked(a1,packing) or blocked(packing,a1))",
+                    lambda: any_of(
+                        robot.at("packing"),
+                        robot.blocked("a1", "packing"),
+                        robot.blocked("packing", "a1"),
+                    ),
                 ),
                 Latch(
-                    "drive(a2)",
-                    lambda: robot.drive("a2"),
+                    "drive(a1)",
+                    lambda: robot.drive("a1"),
                     robot.cancel,
                     guard=lambda: all_of(
-                        negated(robot.at("a2")),
+                        negated(robot.at("a1")),
                         any_of(
-                            robot.at("a2"),
+                            robot.at("a1"),
                             all_of(
-                                any_of(
-                                    robot.at("a1"),
-                                    all_of(
-                                        robot.at("packing"),
-                                        negated(robot.blocked("packing", "a1")),
-                                        negated(robot.blocked("a1", "packing")),
-                                    ),
-                                    all_of(
-                                        robot.at("a2"),
-                                        negated(robot.blocked("a2", "a1")),
-                                        negated(robot.blocked("a1", "a2")),
-                                    ),
-                                ),
-                                negated(robot.blocked("a1", "a2")),
+                                robot.at("packing"),
+                                negated(robot.blocked("packing", "a1")),
+                                negated(robot.blocked("a1", "packing")),
+                            ),
+                            all_of(
+                                robot.at("a2"),
                                 negated(robot.blocked("a2", "a1")),
+                                negated(robot.blocked("a1", "a2")),
                             ),
                         ),
                     ),
