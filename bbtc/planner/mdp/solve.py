@@ -100,7 +100,14 @@ def _of_endless(
         found = Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
     if search is not None and found.stop is not None:
         closed = closed_in(search, limits, target, verdict=verdict)
-        found = Best(closed.found, closed.bounds, closed.stop, closed.interrupted)
+        better = closed.bounds.lower > found.bounds.lower
+        most = min(most, found.bounds.upper, closed.bounds.upper)
+        found = Best(
+            closed.found if better else found.found,
+            closed.bounds if better else found.bounds,
+            closed.stop,
+            closed.interrupted,
+        )
     bounds = Bounds(found.bounds.lower, max(found.bounds.lower, min(found.bounds.upper, most)))
     return replace(found, bounds=bounds)
 

@@ -6,9 +6,10 @@ of no knowledge. Its *worlds* are what may be true of the hidden facts then. A b
 of its worlds. What an action does is a matrix for each thing that the robot may be told: it makes of the
 weights those of the worlds after, not normalized.
 
-An action applies in a belief if it does in each of its worlds. That is so where preconditions ask that
-something is known, never that it is unknown: a robot that knows more can do more then, and the best
-probability is a convex function of the weights. Disjunctions are spelled out, an action for each part.
+An action applies in a belief if it does in each of its worlds: a robot that knows more can do more, and the
+best probability is a convex function of the weights. So it is where conditions ask that something is known;
+what they ask to be unknown, or only believed, counts as met here, which may make P* greater, but seldom does:
+who knows already need not look. Disjunctions are spelled out, an action for each part.
 """
 
 from __future__ import annotations
@@ -101,8 +102,8 @@ class Pomdp:
 
 
 def pomdp_of(task: Task, limits: Limits) -> Pomdp | None:
-    """The task as such a process. None where it asks for something to be unknown, or only believed, and
-    where effects read what is known. Raises ``LimitReached`` where it has more worlds than the limit on
+    """The task as such a process. None where conditions are too large a disjunction, and where effects read
+    what is known. Raises ``LimitReached`` where it has more worlds than the limit on
     states, or where it takes too long."""
     if reads_knowledge(task):
         return None
@@ -150,32 +151,25 @@ class _Known:
         found: list[_Part] = []
         spelled = cubes(bit_test(self.packing, condition), MOST_CUBES)
         for cube in spelled or ():
-            inner = self._part(cube)
-            if inner is None:
-                return None
-            found += inner
+            found += self._part(cube)
         return found if spelled is not None and len(found) <= MOST_CUBES else None
 
-    def _part(self, cube: Cube) -> list[_Part] | None:
+    def _part(self, cube: Cube) -> list[_Part]:
         mask, value = cube.mask, cube.value
         choices: list[list[tuple[int, Condition]]] = []
         for variable, what in self.of_what.items():
             bits = self.packing.bits(variable)
             asked, true = mask & bits, 1 << variable
             mask &= ~bits
-            if not asked:
-                continue
-            if what is None or value & bits & ~true:
-                return None
+            if what is None or not asked or value & bits & ~true:
+                continue  # nothing is asked, or what counts as met
             number, condition = what
             if value & true:
                 choices.append([(number, condition)])
-            elif asked & true == 0:  # known, whichever it is
-                choices.append([(number, condition), (number, negation(condition))])
             elif asked == bits:
                 choices.append([(number, negation(condition))])
-            else:
-                return None
+            elif asked & true == 0:  # known, whichever it is
+                choices.append([(number, condition), (number, negation(condition))])
         return [_Part(Cube(mask, value & mask), drawn) for drawn in product(*choices)]
 
 

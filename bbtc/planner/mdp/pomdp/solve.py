@@ -98,10 +98,13 @@ def _exactly(search: Search, limits: Limits) -> MaxProb:
             explorer.expand(np.array([state]), limits)
             choices[state] = explorer.since(mark)
         told = _told(pomdp, explorer, state, vector)
-        for after, draw in _edges(choices[state], vector.doing.action):
+        edges = list(_edges(choices[state], vector.doing.action))
+        for after, draw in edges:
             next_vector = _nearest(told, *_belief(pomdp, explorer, after))
             if next_vector is not None:
                 come(-weight * float(explorer.tables.draws[draw].probability), after, next_vector)
+        if not edges and len(told) == 1:  # to look at what is known
+            come(-weight, state, told[0][2])
     fringe: Flags = ~explorer.goal()
     fringe[list(choices)] = False
     return max_prob(explorer.space(fringe, None), limits)
