@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from math import gcd
 from typing import TypeAlias, TypeVar
 
 Row: TypeAlias = dict[int, Fraction]
@@ -39,6 +40,25 @@ def distribution(parts: Iterable[tuple[_N, Fraction]]) -> dict[_N, Fraction]:
     for outcome, probability in parts:
         found[outcome] = found[outcome] + probability if outcome in found else probability
     return found
+
+
+def weighted(pairs: Iterable[tuple[Fraction, Fraction]], more: Fraction = _ZERO) -> Fraction:
+    """The sum of the products of pairs, and what is ``more``: what ``+`` and ``*`` give, but reduced at the
+    end, and not at each step."""
+    numerator, denominator = more.as_integer_ratio()
+    for weight, value in pairs:
+        part = weight.numerator * value.numerator
+        if not part:
+            continue
+        below = weight.denominator * value.denominator
+        if below == denominator:
+            numerator += part
+        else:
+            common = gcd(below, denominator)
+            scale = below // common
+            numerator = numerator * scale + part * (denominator // common)
+            denominator *= scale
+    return Fraction(numerator, denominator)
 
 
 def components(successors: Sequence[Sequence[int]]) -> list[list[int]]:
@@ -107,25 +127,20 @@ def solve(
             look()
         if len(component) == 1:
             (state,) = component
-            total, loop = constant[state], _ZERO
-            for successor, p in rows[state].items():
-                if successor == state:
-                    loop = p
-                else:
-                    total += p * values[successor]
+            row = rows[state]
+            loop = row.get(state)
+            onward = ((p, values[successor]) for successor, p in row.items() if successor != state)
+            total = weighted(onward, constant[state]) if row else constant[state]
             values[state] = total / (1 - loop) if loop else total
             continue
         inside = set(component)
         system: dict[int, Row] = {}
         known: dict[int, Fraction] = {}
         for state in component:
-            known[state] = constant[state]
-            system[state] = {}
-            for successor, p in rows[state].items():
-                if successor in inside:
-                    system[state][successor] = p
-                else:
-                    known[state] += p * values[successor]
+            row = rows[state]
+            system[state] = {successor: p for successor, p in row.items() if successor in inside}
+            onward = ((p, values[successor]) for successor, p in row.items() if successor not in inside)
+            known[state] = weighted(onward, constant[state])
         if not _eliminate(system, known, values, most_work, look):
             return None
     return values
@@ -185,5 +200,5 @@ def _eliminate(
             place[state] = degree(state)
             buckets.setdefault(place[state], {})[state] = None
     for state in reversed(order):
-        values[state] = constant[state] + sum((p * values[t] for t, p in rows[state].items()), _ZERO)
+        values[state] = weighted(((p, values[t]) for t, p in rows[state].items()), constant[state])
     return True

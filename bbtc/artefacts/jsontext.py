@@ -53,24 +53,29 @@ def dumps(value: object) -> str:
             continue
         lead, part = item
         out.append(lead)
-        if isinstance(part, Mapping) and part:
+        if isinstance(part, str):
+            out.append(_encoded(part))
+        elif isinstance(part, Mapping) and part:
             out.append("{")
             closers.append("}")
             stack.append(_members(part, _INDENT * len(stack)))
-        elif isinstance(part, Sequence) and not isinstance(part, str) and part:
+        elif isinstance(part, Sequence) and part:
             out.append("[")
             closers.append("]")
             stack.append(_elements(part, _INDENT * len(stack)))
         else:
-            out.append(json.dumps(part, ensure_ascii=False))
+            out.append(_encoded(part))
     out.append("\n")
     return escaped("".join(out))
+
+
+_encoded = json.JSONEncoder(ensure_ascii=False).encode
 
 
 def _members(value: Mapping[str, object], indent: str) -> Iterator[tuple[str, object]]:
     comma = ""
     for key, part in value.items():
-        yield f"{comma}\n{indent}{json.dumps(key, ensure_ascii=False)}: ", part
+        yield f"{comma}\n{indent}{_encoded(key)}: ", part
         comma = ","
 
 

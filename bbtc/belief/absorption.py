@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from bbtc.belief.chain import Chain
-from bbtc.markov import components, distribution, solve
+from bbtc.markov import components, distribution, solve, weighted
 
 _ZERO = Fraction(0)
 _ONE = Fraction(1)
@@ -70,4 +70,4 @@ class Absorption:
 
     def start(self, values: Sequence[Fraction]) -> Fraction:
         """The expectation of a state function over the initial states."""
-        return sum((p * values[s] for p, s in self.chain.initial), _ZERO)
+        return weighted((p, values[s]) for p, s in self.chain.initial)

@@ -44,11 +44,17 @@ def product_of(values: Values, drawers: Iterable[Drawer], spend: Spend) -> dict[
         combined: dict[Draw, Fraction] = {}
         for (delta, cost, reward), p in total.items():
             for (delta2, cost2, reward2), p2 in drawn.items():
-                key = (_unite(delta, delta2), cost + cost2, reward + reward2)
-                combined[key] = combined.get(key, Fraction(0)) + p * p2
+                key = (_unite(delta, delta2), _plus(cost, cost2), _plus(reward, reward2))
+                joint = p if p2 is ONE else p2 if p is ONE else p * p2
+                combined[key] = combined[key] + joint if key in combined else joint
             spend(len(drawn), len(combined))
         total = combined
     return {((), ZERO, ZERO): ONE} if total is None else total
+
+
+def _plus(first: Fraction, second: Fraction) -> Fraction:
+    """The sum; most costs and rewards are zero."""
+    return first if second is ZERO else second if first is ZERO else first + second
 
 
 def _unite(first: Delta, second: Delta) -> Delta:
@@ -78,8 +84,9 @@ def compile_factor(factor: Factor, spend: Spend) -> Drawer:
             delta, (cost, reward) = effects(values), amounts(values)
             product = product_of(values, nested, spend)
             for (delta2, cost2, reward2), p in product.items():
-                key = (_unite(delta, delta2), cost + cost2, reward + reward2)
-                drawn[key] = drawn.get(key, Fraction(0)) + probability * p
+                key = (_unite(delta, delta2), _plus(cost, cost2), _plus(reward, reward2))
+                joint = probability if p is ONE else probability * p
+                drawn[key] = drawn[key] + joint if key in drawn else joint
             spend(len(product), len(drawn))
         return drawn
 

@@ -45,6 +45,9 @@ Belief: TypeAlias = tuple[tuple[int, int], ...]
 """Worlds still possible, in order, with weights: positive integers without a common divisor."""
 
 
+_MOST_KEPT = 5_000  # results of a change that are kept
+
+
 @dataclass(slots=True)
 class Beliefs:
     """The beliefs of a component that were met, by number, and what is known in each."""
@@ -56,6 +59,28 @@ class Beliefs:
     _true: dict[int, tuple[int, ...]] = field(default_factory=dict)
     """By world: which of the conditions of :attr:`Component.known` are true."""
     _chances: dict[tuple[int, Condition], Fraction] = field(default_factory=dict)
+    _draws: dict[tuple[int, int], tuple[Change, dict[tuple[int, bytes], dict[Draw, Fraction]]]] = field(
+        default_factory=dict
+    )
+
+    def draws_of(self, change: Change, first: int) -> dict[tuple[int, bytes], dict[Draw, Fraction]]:
+        """What was found to come of a change, by what decides over it, in tasks that have the number of what
+        is believed at ``first``: whoever compiles the change adds to it."""
+        known = self._draws.get((id(change), first))
+        if known is None or known[0] is not change:
+            known = self._draws[id(change), first] = change, {}
+        return known[1]
+
+    def __reduce__(self) -> tuple[Callable[..., Beliefs], tuple[object, ...]]:
+        """What comes of changes stays in this process, as these are known by where they are."""
+        return Beliefs, (
+            self.component,
+            self.by_number,
+            self._numbers,
+            self._known,
+            self._true,
+            self._chances,
+        )
 
     @property
     def prior(self) -> int:
@@ -240,13 +265,15 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
     are expected ones."""
     readings = Readings(task, change, spend)
     first = place_of(task, change.component)
-    cache: dict[tuple[int, bytes], dict[Draw, Fraction]] = {}
+    cache = readings.beliefs.draws_of(change, first)
 
     def draw(values: Values) -> dict[Draw, Fraction]:
         case = case_of(task, change, values)
         found = cache.get(case)
         if found is None:
-            found = cache[case] = results(*case)
+            found = results(*case)
+            if len(cache) < _MOST_KEPT:
+                cache[case] = found
         return found
 
     def results(number: int, seen: bytes) -> dict[Draw, Fraction]:
@@ -256,7 +283,7 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
             sets += readings.beliefs.known(reading.belief)
             sets += [(first + at, octet) for at, octet in enumerate(reading.belief.to_bytes(PLACES, "big"))]
             key = tuple(sorted(sets)), reading.cost, reading.reward
-            drawn[key] = drawn.get(key, ZERO) + reading.probability
+            drawn[key] = drawn[key] + reading.probability if key in drawn else reading.probability
         spend(len(drawn), len(drawn))
         return drawn
 
@@ -274,6 +301,16 @@ class Reading(NamedTuple):
     probability: Fraction
     cost: Fraction
     reward: Fraction
+
+
+class Happening(NamedTuple):
+    """One of the things that a change may do in a world: what the robot is shown and told, as in
+    :class:`Reading`, the world after, and the probability."""
+
+    shown: Delta
+    told: Delta
+    world: int
+    probability: Fraction
 
 
 class Readings:
@@ -305,17 +342,21 @@ class Readings:
                 observed,
                 self.beliefs.number(mass),
                 Fraction(whole, total),
-                cost / whole,
-                reward / whole,
+                cost / whole if cost else ZERO,
+                reward / whole if reward else ZERO,
             )
 
     def in_world(self, number: int, seen: bytes, world: int) -> Iterator[tuple[Delta, int, int, Fraction]]:
         """What may happen in one world: what is seen of the seen variables, what is believed then, the world
         after, and the probability."""
         beliefs = {(reading.shown, reading.told): reading.belief for reading in self.after(number, seen)}
+        for part in self.parts(seen, world):
+            yield part.shown, beliefs[part.shown, part.told], part.world, part.probability
+
+    def parts(self, seen: bytes, world: int) -> Iterator[Happening]:
+        """What may happen in one world, whatever is believed."""
         for part in self._kernel.of(world, seen):
-            shown, told = self._split(part.told)
-            yield shown, beliefs[shown, told], part.world, part.probability
+            yield Happening(*self._split(part.told), part.world, part.probability)
 
     def _split(self, told: _Told) -> tuple[Delta, Delta]:
         """What is seen of the seen variables, and what the observations told."""

@@ -10,8 +10,9 @@ from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import FailureFinder
 from bbtc.belief.tick import NodeStatus, compile_tick
 from bbtc.ground.condition import Condition
-from bbtc.ground.task import Task
+from bbtc.ground.task import ONE, ZERO, Task
 from bbtc.limits import Limits
+from bbtc.markov import weighted
 from bbtc.tree.nodes import Node, walk
 
 
@@ -59,7 +60,7 @@ def simulate(task: Task, root: Node, limits: Limits) -> Figures:
 def success_of(chain: Chain) -> Fraction:
     """The probability that runs end in success, the goal being true."""
     visits = Absorption(chain).visits()
-    return sum(((visits[state] or Fraction(0)) * chain.won(state) for state in chain.final), Fraction(0))
+    return weighted((visits[state] or ZERO, chain.won(state)) for state in chain.final)
 
 
 def figures(task: Task, root: Node, chain: Chain) -> Figures:
@@ -75,20 +76,16 @@ def figures(task: Task, root: Node, chain: Chain) -> Figures:
     )
     success = mass[NodeStatus.SUCCESS] - mistaken
     wins = absorption.hitting({state: chain.won(state) for state in chain.final if chain.won(state)})
-    cost, actions, reward = Fraction(0), Fraction(0), Fraction(0)
-    won_cost, won_actions = Fraction(0), Fraction(0)
-    for state, edges in enumerate(chain.edges):
-        visit = visits[state]
-        if visit is None:
-            continue
-        for edge in edges:
-            weight = visit * edge.result.probability
-            won = weight * wins[edge.successor]
-            cost += weight * edge.result.cost
-            reward += weight * edge.result.reward
-            actions += weight
-            won_cost += won * edge.result.cost
-            won_actions += won
+    taken = [
+        (visit * edge.result.probability, edge)
+        for visit, edges in zip(visits, chain.edges, strict=True)
+        if visit
+        for edge in edges
+    ]
+    won = [(weight * wins[edge.successor], edge) for weight, edge in taken]
+    actions, won_actions = (weighted((weight, ONE) for weight, _ in each) for each in (taken, won))
+    cost, won_cost = (weighted((weight, edge.result.cost) for weight, edge in each) for each in (taken, won))
+    reward = weighted((weight, edge.result.reward) for weight, edge in taken)
     return Figures(
         success=success,
         failure=mass[NodeStatus.FAILURE],

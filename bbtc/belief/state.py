@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import Draw, Values, compile_factor, product_of
 from bbtc.belief.hidden import compile_change, told_first
-from bbtc.ground.task import NO_CHANGE, GroundAction, Task
+from bbtc.ground.task import NO_CHANGE, ZERO, GroundAction, Task
 from bbtc.limits import Limits
 from bbtc.markov import distribution
 
@@ -50,8 +50,9 @@ def initial_belief(task: Task) -> dict[Values, Fraction]:
 _LOOK = 4096  # combinations of outcomes between two looks at the clock
 
 
-class _Bounded:
-    """Ends the multiplication of outcomes: n independent draws may have 2 to the n results."""
+class Bounded:
+    """A :data:`bbtc.belief.draws.Spend` that ends the multiplication of outcomes: n independent draws may
+    have 2 to the n results."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
@@ -72,7 +73,7 @@ def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transiti
     first (ties by values). Results are cached per assignment. The function raises
     :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on states, or
     for longer than time and memory allow."""
-    bounded = _Bounded(limits)
+    bounded = Bounded(limits)
     factors = (factor for factor in action.factors if factor != NO_CHANGE)
     drawers = [compile_factor(factor, bounded.spend) for factor in factors]
     drawers += [compile_change(task, change, bounded.spend) for change in action.changes]
@@ -95,7 +96,9 @@ def _results(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> tup
         after = bytearray(values)
         for variable, value in delta:
             after[variable] = value
-        key = (bytes(after), cost + extra, reward)
-        merged[key] = merged.get(key, Fraction(0)) + probability
+        key = (bytes(after), cost if extra is ZERO else cost + extra, reward)
+        merged[key] = merged[key] + probability if key in merged else probability
     results = [Result(p, c, r, v) for (v, c, r), p in merged.items()]
-    return tuple(sorted(results, key=lambda r: (-r.probability, r.values, r.cost, r.reward)))
+    if len(results) > 1:
+        results.sort(key=lambda r: (-r.probability, r.values, r.cost, r.reward))
+    return tuple(results)

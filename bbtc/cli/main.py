@@ -18,6 +18,9 @@ def main() -> None:
     try:
         _take_over_signals()
         _take_over_streams()
+        import gc
+
+        gc.set_threshold(10_000)  # planning makes many objects and few cycles; Python looks at every 700
         from bbtc.cli.outcome import run
 
         status: int = run()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, TypeAlias
@@ -116,21 +116,21 @@ NOTHING = Together(())
 def walk(effect: Effect, *, possible: bool = False) -> Iterator[Effect]:
     """Every part of an effect, parents first, from left to right; with ``possible``, without what stands in
     branches of probability 0."""
-    yield effect
-    inner: Iterable[Effect]
-    match effect:
-        case Set() | Add():
-            inner = ()
-        case Together(parts):
-            inner = parts
-        case When(_, part) | ForEach(_, part):
-            inner = (part,)
-        case Choice(branches):
-            inner = (branch.effect for branch in branches if branch.probability > 0 or not possible)
-        case _:
-            assert_never(effect)
-    for part in inner:
-        yield from walk(part, possible=possible)
+    waiting = [effect]
+    while waiting:
+        each = waiting.pop()
+        yield each
+        match each:
+            case Set() | Add():
+                pass
+            case Together(parts):
+                waiting.extend(reversed(parts))
+            case When(_, part) | ForEach(_, part):
+                waiting.append(part)
+            case Choice(branches):
+                waiting += (b.effect for b in reversed(branches) if not possible or b.probability > 0)
+            case _:
+                assert_never(each)
 
 
 def leaves(effect: Effect, *, possible: bool = False) -> Iterator[Set | Add]:

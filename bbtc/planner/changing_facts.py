@@ -111,6 +111,8 @@ class ChangingFacts:
     def _settled(self, state: Values, sets: _Sets, holding: Sequence[Sequence[int]]) -> list[Values]:
         """The states after a move with the fewest other facts changed, so that no group is contradicted; none
         if that takes too many."""
+        if self._around.keys().isdisjoint(sets):
+            return [_with(state, sets)]
         waiting: dict[tuple[tuple[int, Truth], ...], None] = {tuple(sorted(sets.items())): None}
         tried = 0
         for _ in range(_MOST_GIVING_WAY + 1):
@@ -123,10 +125,7 @@ class ChangingFacts:
                 now = dict(fixed)
                 more = self._lacking(now, holding)
                 if more is None:
-                    after = bytearray(state)
-                    for variable, value in fixed:
-                        after[variable] = value
-                    found.append(bytes(after))
+                    found.append(_with(state, now))
                     continue
                 for variable, value in more:
                     further[tuple(sorted((now | {variable: value}).items()))] = None
@@ -151,6 +150,13 @@ class ChangingFacts:
             if group.always and not true and not still:
                 return [(v, Truth.TRUE) for v in group.members if v not in fixed]
         return None
+
+
+def _with(state: Values, sets: _Sets) -> Values:
+    after = bytearray(state)
+    for variable, value in sets.items():
+        after[variable] = value
+    return bytes(after)
 
 
 def _values(task: Task) -> list[tuple[Truth, ...]]:

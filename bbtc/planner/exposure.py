@@ -59,10 +59,11 @@ def _changes_of_success(
     space, packing = found.space, found.space.packing
     numbers = {row.tobytes(): number for number, row in enumerate(space.states)}
     changes = np.zeros(len(values))
+    before = packing.values(space.states[visited])
     for count, state in enumerate(visited.tolist()):
         if count % _LOOK == 0:
             limits.check_time("the search for a tree that recovers")
-        ways = facts.changes(packing.values(space.states, state))
+        ways = facts.changes(before[count])
         rows = packing.split(packing.pack(after) for _, after in ways)
         for (chance, _), row in zip(ways, rows, strict=True):
             number = numbers.get(row.tobytes(), state)

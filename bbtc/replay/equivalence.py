@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from importlib.util import find_spec
 from itertools import islice
 from types import MappingProxyType
@@ -10,6 +11,7 @@ from types import MappingProxyType
 from bbtc.belief.chain import explore
 from bbtc.belief.monitored import with_hidden
 from bbtc.belief.scenarios import scenarios
+from bbtc.ground.task import ONE
 from bbtc.limits import Limits
 from bbtc.pipeline import with_monitor, without_hidden
 from bbtc.replay.script import TIMINGS, run_of, script_of
@@ -18,6 +20,10 @@ from bbtc.tree.nodes import Tree
 
 ENGINES = MappingProxyType({"py_trees": "py_trees", "btcpp": "behaviortreepy"})
 """The formats whose engines run here, and the modules that bring these along."""
+
+
+_RARE = Fraction(1, 10**9)
+"""Runs of a tree that tries for ever become longer and longer, and less and less probable."""
 
 
 def engine_missing(form: str) -> str | None:
@@ -29,8 +35,9 @@ def engine_missing(form: str) -> str | None:
 def difference(tree: Tree, form: str, limits: Limits, most: int = 200) -> str | None:
     """How an export behaves differently from the simulation, in words; None if it does not.
 
-    Replays the ``most`` most probable runs, each with outcomes that land between ticks, during a tick, and
-    within the one that starts the action. Raises ``LimitReached``.
+    Replays the ``most`` most probable runs, without those that come less often than :data:`_RARE`, each
+    with outcomes that land between ticks, during a tick, within the one that starts the action, and after the
+    tick. Raises ``LimitReached``.
     """
     from bbtc.replay.engines import BtcppReplay, PyTreesReplay
 
@@ -42,6 +49,7 @@ def difference(tree: Tree, form: str, limits: Limits, most: int = 200) -> str | 
         tree = replace(tree, task=with_hidden(tree.task))
     chain = explore(tree.task, tree.root, limits)
     replay = PyTreesReplay(exported) if form == "py_trees" else BtcppReplay(exported)
+    left = ONE
     for number, scenario in enumerate(islice(scenarios(chain, limits), most), 1):
         expected, script = run_of(scenario), script_of(scenario)
         if told is not None:
@@ -53,6 +61,9 @@ def difference(tree: Tree, form: str, limits: Limits, most: int = 200) -> str | 
                     f"run {number} (outcomes land {timing}): expected {_words(expected.actions)}, "
                     f"{expected.status}; {form} did {_words(found.actions)}, {found.status}"
                 )
+        left -= scenario.probability
+        if left < _RARE:
+            break
     return None
 
 

@@ -19,8 +19,9 @@ from bbtc.belief.soundness import violations
 from bbtc.belief.state import Transition
 from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
-from bbtc.ground.task import Task
+from bbtc.ground.task import ZERO, Task
 from bbtc.limits import Limits
+from bbtc.markov import weighted
 from bbtc.rewrite.simplify import simplified, size
 from bbtc.tree.nodes import ControlNode, Node, actions_of
 
@@ -82,10 +83,12 @@ class _Worth:
         for state in chain.final:
             ends[chain.status[state]] += visits[state] or 0
         endless = 1 - sum(ends.values(), Fraction(0))
-        cost = Fraction(0)
-        for visit, edges in zip(visits, chain.edges, strict=True):
-            cost += (visit or 0) * sum((e.result.probability * e.result.cost for e in edges), Fraction(0))
-        success = sum(((visits[state] or 0) * chain.won(state) for state in chain.final), Fraction(0))
+        cost = weighted(
+            (visit, weighted((edge.result.probability, edge.result.cost) for edge in edges))
+            for visit, edges in zip(visits, chain.edges, strict=True)
+            if visit
+        )
+        success = weighted((visits[state] or ZERO, chain.won(state)) for state in chain.final)
         return cls(success, endless, None if endless else cost)
 
     def will_do(self, before: _Worth, target: Fraction) -> bool:

@@ -11,6 +11,7 @@ from bbtc.syntax.ast import Comment
 
 _COMMENT = re.compile(r";[^\r\n]*")
 _NOT_PARENTHESES = re.compile(r"[^()]+")
+_PIECE = 1 << 16  # characters, after which a hostile text is looked at more closely
 _STEP = {"(": 1, ")": -1}
 _FOREIGN = re.compile(r"[^ \t\r\n\f\v()a-zA-Z0-9_.*+@#$%!~?:=<>/-]+")
 
@@ -35,8 +36,13 @@ def without_comments(text: str) -> str:
 def too_deep(text: str, limit: int) -> int | None:
     """Offset of the first parenthesis that is nested deeper than a limit."""
     # What nearly every file passes runs without a loop in Python.
-    parentheses = _NOT_PARENTHESES.sub("", text)
-    if max(accumulate(map(_STEP.__getitem__, parentheses)), default=0) <= limit:
+    depth = 0
+    for start in range(0, len(text), _PIECE):
+        parentheses = _NOT_PARENTHESES.sub("", text[start : start + _PIECE])
+        if max(accumulate(map(_STEP.__getitem__, parentheses), initial=depth)) > limit:
+            break
+        depth += 2 * parentheses.count("(") - len(parentheses)
+    else:
         return None
     depth = 0
     for match in re.finditer(r"[()]", text):

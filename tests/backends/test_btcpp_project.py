@@ -35,7 +35,7 @@ from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import simulate_tree
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
-from tests.domains.problems import PROBLEMS, plan_of
+from tests.domains.problems import PROBLEMS, tree_of
 from tests.replay.compiled import cmake_build, library_prefix, require_library
 from tests.strategies import HOSTILE_NAMES, soda_tree
 
@@ -82,7 +82,7 @@ def test_the_program_of_a_domain_compiles_and_succeeds_as_often_as_simulated(
     name: str, nodes: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (problem,) = [problem for problem in PROBLEMS if str(problem) == name]
-    tree = plan_of(problem).tree
+    tree = tree_of(problem)
     success = simulate_tree(tree, Limits())[0].success
     build = built(tmp_path, tree, nodes=nodes)
     assert_succeeds_as_often(build / "simulate", success)

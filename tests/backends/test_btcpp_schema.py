@@ -16,7 +16,7 @@ from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.palette import btcpp_palette
 from bbtc.tree.nodes import Tree
 from tests.btcpp_nodes import faults, registered
-from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.domains.problems import PROBLEMS, Problem, tree_of
 from tests.replay.random_trees import random_tree
 
 PROFILES = ["stock", "bbtc"]
@@ -44,7 +44,7 @@ def check(tree: Tree) -> None:
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_the_trees_of_the_domains_are_valid(problem: Problem) -> None:
-    check(plan_of(problem).tree)
+    check(tree_of(problem))
 
 
 @pytest.mark.parametrize("seed", range(1, 9))

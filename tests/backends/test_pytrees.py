@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import importlib.util
 import os
 import random
@@ -184,6 +185,7 @@ def test_hostile_names_neither_become_code_nor_change_what_it_does(tree: Tree) -
         assert replay.run(script) == expected
 
 
+@functools.cache
 def known_names() -> set[str]:
     """Names that a module may refer to, whatever the tree."""
     runtime = [REPOSITORY / "bbtc" / "runtime" / f"{module}.py" for module in MODULES]

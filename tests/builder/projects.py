@@ -19,10 +19,12 @@ COIN = """(define (domain coin)
 
 
 def bbtc(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the command in a folder."""
+    """Run the command in a folder. What is built is built in one process, unless the arguments tell how many
+    jobs are done at once: each process more is one to be loaded."""
     from tests.cli import program
 
-    return program.bbtc(*arguments, folder=folder)
+    one = ("-j", "1") if arguments[:1] == ("build",) and "-j" not in arguments else ()
+    return program.bbtc(*arguments, *one, folder=folder)
 
 
 def project(folder: Path, manifest: str, **sources: str) -> Path:

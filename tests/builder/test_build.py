@@ -24,6 +24,7 @@ from bbtc.builder.job import Job
 from bbtc.builder.runner import BuildReport, build
 from bbtc.manifest.entries import TreeEntry
 from tests.builder.projects import COIN, REPOSITORY, bbtc, project, several, snapshot
+from tests.long_form import amount
 
 LAMP = "(define (domain lamp) (:predicates (lit)) (:action on :effect (lit)))\n"
 LIGHT = "(define (problem light) (:domain lamp) (:goal (lit)))\n"
@@ -311,24 +312,36 @@ ONESHOT = """(define (domain oneshot) (:predicates (done) (left))
 """
 
 
-@pytest.mark.parametrize("name", FAILING)
-@pytest.mark.parametrize("jobs", ["1", "2"])
-def test_a_failure_loses_no_other_tree_and_writes_nothing(tmp_path: Path, name: str, jobs: str) -> None:
-    settings, status, code = FAILING[name]
+@pytest.mark.parametrize(
+    ("names", "jobs"),
+    [*(([name], jobs) for name in FAILING for jobs in ("1", "2")[: amount(1, 2)]), ([*FAILING], "2")],
+    ids=lambda value: value if isinstance(value, str) else "+".join(value),
+)
+def test_a_failure_loses_no_other_tree_and_writes_nothing(
+    tmp_path: Path, names: list[str], jobs: str
+) -> None:
+    """By itself, and all of them at once."""
+    bad = "".join(f"  bad{number}: {FAILING[name][0]}\n" for number, name in enumerate(names))
     good = "  good: {domain: coin.pddl, target: 0.5}\n  too: {domain: coin.pddl, target: 0.75}\n"
-    manifest = f"trees:\n  bad: {settings}\n{good}"
     folder = project(
-        tmp_path, manifest, coin_pddl=COIN, broken_pddl="(define (domain d)\n", oneshot_pddl=ONESHOT
+        tmp_path,
+        f"trees:\n{bad}{good}",
+        coin_pddl=COIN,
+        broken_pddl="(define (domain d)\n",
+        oneshot_pddl=ONESHOT,
     )
     done = bbtc(folder, "build", "-j", jobs)
+    status = min(FAILING[name][1] for name in names)
     assert done.returncode == status, done.stderr
-    assert f"[{code}]" in done.stderr
+    for name in names:
+        assert f"[{FAILING[name][2]}]" in done.stderr
     assert "Traceback" not in done.stderr
-    assert "3 trees: 2 built, 0 up to date, 1 failed" in done.stderr
+    trees, failed = len(names) + 2, len(names)
+    assert f"{trees} trees: 2 built, 0 up to date, {failed} failed" in done.stderr
     assert sorted(path.name for path in (folder / "build").iterdir()) == ["good.tree.json", "too.tree.json"]
     again = bbtc(folder, "build", "-j", jobs)
     assert again.returncode == status
-    assert "3 trees: 0 built, 2 up to date, 1 failed" in again.stderr
+    assert f"{trees} trees: 0 built, 2 up to date, {failed} failed" in again.stderr
 
 
 @pytest.mark.parametrize(

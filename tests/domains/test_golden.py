@@ -44,10 +44,14 @@ def digests(share: str) -> str:
 
 
 def _share(share: str) -> list[Problem]:
-    return PROBLEMS if LONG else PROBLEMS[SEEDS.index(share) :: len(SEEDS)]
+    quick = [problem for problem in PROBLEMS if str(problem) not in LARGE]
+    return PROBLEMS if LONG else quick[SEEDS.index(share) :: len(SEEDS)]
 
 
 SEEDS = ["1", "4242"]
+LARGE = {"hospital/two-boxes", "service-robot/two-goals"}
+"""Which take as long as all others: in the short form they are planned once, above, with whatever seed this
+process has."""
 
 
 @pytest.mark.parametrize("seed", SEEDS)

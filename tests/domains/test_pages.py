@@ -14,13 +14,14 @@ import pytest
 from bbtc.artefacts.numbers import exact
 from bbtc.belief.chain import explore
 from bbtc.belief.scenarios import scenarios
+from bbtc.belief.simulate import simulate
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.tree.nodes import ConditionNode, ControlNode, Node, walk
+from bbtc.tree.nodes import ConditionNode, ControlNode, Node, Tree, walk
 from tests.conftest import GOLDEN, Golden
 from tests.domains.constructs import users
-from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc, plan_of
+from tests.domains.problems import DOMAINS, PROBLEMS, REPOSITORY, Problem, bbtc, plan_of, tree_of
 
 PAGES = REPOSITORY / "docs" / "domains"
 MADE = re.compile(r"(?<=<!-- )(?!end )(\w+)(?:: ([\w/-]+))? -->\n.*?(?=<!-- end -->)", re.DOTALL)
@@ -46,9 +47,18 @@ def fenced(text: str) -> str:
     return f"\n```text\n{text}```\n\n"
 
 
-def tree(problem: Problem) -> str:
+def planned(problem: Problem, anew: bool) -> tuple[Tree, int]:
+    """The tree of a problem, and by how many refinements it was made: as its golden files have it, or now."""
+    if anew:
+        plan = plan_of(problem)
+        return plan.tree, len(plan.refinements)
+    told = (GOLDEN / str(problem) / "plan.txt").read_text(encoding="utf-8")
+    return tree_of(problem), len(re.findall(r"^ *\d+\. ", told, re.MULTILINE))
+
+
+def tree(problem: Problem, anew: bool) -> str:
     """The tree as an outline."""
-    made = plan_of(problem).tree  # its task may have variables more, for what is believed
+    made, _ = planned(problem, anew)  # its task may have variables more, for what is believed
     return fenced(outline(made.task, made.root))
 
 
@@ -62,7 +72,7 @@ def plan(problem: Problem, anew: bool) -> str:
     return fenced("".join(f"{line}\n" for line in lines[: last + 1]))  # warnings follow
 
 
-def figures(domain: str) -> str:
+def figures(domain: str, anew: bool) -> str:
     """A table of the problems of a domain with their exact figures."""
     rows = [
         "| problem | target | success | refinements | nodes | belief states | scenarios | cost | actions |",
@@ -70,19 +80,20 @@ def figures(domain: str) -> str:
     ]
     for problem in PROBLEMS:
         if problem.domain == domain:
-            made = plan_of(problem)
-            runs = scenarios(explore(made.tree.task, made.tree.root, Limits()), Limits())
+            made, refinements = planned(problem, anew)
+            does = simulate(made.task, made.root, Limits())
+            runs = scenarios(explore(made.task, made.root, Limits()), Limits())
             count = sum(1 for _ in itertools.islice(runs, 500))
             cells = [
                 f"[{problem.name}](../../{problem.files[1]})",
-                exact(made.tree.target),
-                exact(made.tree.success_probability),
-                str(len(made.refinements)),
-                str(sum(1 for _ in walk(made.tree.root))),
-                str(made.figures.states),
+                exact(made.target),
+                exact(made.success_probability),
+                str(refinements),
+                str(sum(1 for _ in walk(made.root))),
+                str(does.states),
                 "over 500" if count == 500 else str(count),
-                "∞" if made.figures.cost is None else exact(made.figures.cost),
-                "∞" if made.figures.actions is None else exact(made.figures.actions),
+                "∞" if does.cost is None else exact(does.cost),
+                "∞" if does.actions is None else exact(does.actions),
             ]
             rows.append(f"| {' | '.join(cells)} |")
     return "\n" + "".join(f"{row}\n" for row in rows) + "\n"
@@ -100,11 +111,11 @@ def made(kind: str, what: str, anew: bool) -> str:
     """What belongs between the marks."""
     match kind:
         case "tree":
-            return tree(Problem(*what.split("/")))
+            return tree(Problem(*what.split("/")), anew)
         case "plan":
             return plan(Problem(*what.split("/")), anew)
         case "figures":
-            return figures(what)
+            return figures(what, anew)
         case "constructs":
             return constructs()
         case _:

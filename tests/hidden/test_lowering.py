@@ -17,6 +17,7 @@ from tests.domains.lifted import TooLarge
 from tests.ground.examples import task_of
 from tests.hidden.reference import HiddenText
 from tests.hidden.texts import texts
+from tests.long_form import amount
 from tests.profiles import examples
 
 CORRIDOR = """(define (domain d) (:types road) (:predicates (clear ?r - road) (home))
@@ -52,7 +53,7 @@ def _figures(task: Task) -> tuple[Fraction, Fraction, Fraction | None]:
 
 
 @given(texts())
-@examples(60)
+@examples(amount(30, 600))
 def test_the_task_without_components_is_worth_as_much(text: str) -> None:
     try:
         HiddenText.of(text).mdp(150)

@@ -19,7 +19,7 @@ from bbtc.pipeline import import_tree
 from bbtc.source import SourceFile
 from bbtc.syntax.reader import decode_source
 from bbtc.tree.nodes import Tree
-from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.domains.problems import PROBLEMS, Problem, tree_of
 from tests.imports.samples import PROFILES, check_in_engine, elements, exported, idioms_tree, parsed, read
 
 
@@ -182,7 +182,7 @@ def test_a_saved_file_is_the_same_tree(nodes: str, way: Saved) -> None:
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_every_problem_survives_an_editor(problem: Problem) -> None:
     """All at once, in both profiles, with the comment and without it."""
-    tree = plan_of(problem).tree
+    tree = tree_of(problem)
     together = [way for way in WAYS if way not in (palette_dropped, pairs_of_tags, byte_order_mark, one_line)]
     for nodes in PROFILES:
         text = exported(tree, nodes)

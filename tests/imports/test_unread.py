@@ -70,16 +70,14 @@ ATTRIBUTES = sorted(
 @pytest.mark.parametrize("attribute", [*ATTRIBUTES, "ID"])
 @pytest.mark.parametrize("nodes", PROFILES)
 def test_an_attribute_is_refused_by_its_name_and_line(nodes: str, attribute: str) -> None:
-    # In many places at once, which is quick; one that is not named then, without those that are, and alone.
-    every = places(nodes)
-    for first in range(0, len(every), 40):
-        left = [*every[first : first + 40]]
-        while left and (found := named(nodes, attribute, left)):
-            left = [number for number in left if number not in found]
-        if left and not are_unread_ports(nodes, attribute, left):
-            for number in left:
-                if not named(nodes, attribute, [number]):
-                    check_port(nodes, attribute, number)
+    # In all places at once, which is quick; where one is not named then, without those that are, and alone.
+    left = [*places(nodes)]
+    while left and (found := named(nodes, attribute, left)):
+        left = [number for number in left if number not in found]
+    if left and not are_unread_ports(nodes, attribute, left):
+        for number in left:
+            if not named(nodes, attribute, [number]):
+                check_port(nodes, attribute, number)
 
 
 def with_attribute(nodes: str, attribute: str, numbers: list[int]) -> tuple[str, list[ET.Element]]:
@@ -186,7 +184,7 @@ def test_the_page_lists_what_is_without_meaning() -> None:
 
 # --- nodes -----------------------------------------------------------------------------------
 
-STEP = amount(24, 1)
+STEP = amount(48, 1)
 """Of the places in the sample every so many are tried with a node, others with another."""
 
 OF_ENGINE = [(tag, ports) for nodes in NODES.values() for tag, ports in nodes.items()]

@@ -98,7 +98,7 @@ def test_what_never_ends_is_ended_and_counts_as_noticed(toy: Project) -> None:
         "from toy.sums import steps\n\ndef test(): assert steps(2) == 0\n"
     )
     endless = next(each for each in mutants_of(toy.root, "toy/sums.py") if each.mutant == "n += 1")
-    (found,) = try_all(toy, [endless], 1, 8, lambda _: None)
+    (found,) = try_all(toy, [endless], 1, 3, lambda _: None)
     assert found.fate == "timeout"
 
 

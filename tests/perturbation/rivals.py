@@ -22,7 +22,8 @@ from bbtc.limits import Limits
 from bbtc.planner.strategies import DEFAULT
 from bbtc.rewrite.simplify import size
 from bbtc.tree.nodes import Tree
-from tests.domains.problems import PROBLEMS, REPOSITORY, Problem, plan_of, task_of
+from tests.domains.problems import PROBLEMS, REPOSITORY, Problem, task_of
+from tests.domains.problems import tree_of as planned_tree
 
 Author: TypeAlias = Literal["by hand", "planned"]
 AUTHORS: tuple[Author, ...] = ("by hand", "planned")
@@ -55,7 +56,7 @@ def tree_of(problem: Problem, author: Author) -> Tree:
         tree = bbtc.import_tree(file_of(problem), *(REPOSITORY / file for file in problem.files))
         assert tree.task == task_of(problem)
         return tree
-    return plan_of(problem, DEFAULT).tree
+    return planned_tree(problem, DEFAULT)
 
 
 def nodes_of(problem: Problem, author: Author) -> int:

@@ -172,7 +172,7 @@ def test_of_a_long_run_the_end_is_told(tmp_path: Path) -> None:
         f" (:action last :precondition {last}))"
         " (define (problem p) (:domain d) (:init (s0)) (:goal (won)) (:goal-probability 1/2))"
     )
-    bbtc("plan", str(file), "-q", "-o", str(tmp_path / "tree.json"))
+    bbtc("plan", str(file), "--strategy", "policy", "-q", "-o", str(tmp_path / "tree.json"))
     lines = bbtc("simulate", str(tmp_path / "tree.json")).out.decode().splitlines()
     start = lines.index("failing runs, the most probable first:")
     assert (

@@ -27,7 +27,7 @@ from bbtc.planner.result import Plan
 from bbtc.planner.strategies import DEFAULT, STRATEGIES
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, actions_of, walk
 from bbtc.verifier.verdict import verify
-from tests.domains.problems import PROBLEMS, Problem, plan_of, task_of
+from tests.domains.problems import PROBLEMS, Problem, task_of, tree_of
 from tests.long_form import amount
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -71,7 +71,7 @@ def any_values(task: Task, rng: Random, count: int) -> Iterator[list[int]]:
 def test_trees_of_our_domains_keep_to_their_conditions_in_any_state(problem: Problem) -> None:
     rng = Random(7)
     for strategy in {problem.strategy, DEFAULT}:
-        tree = plan_of(problem, strategy).tree
+        tree = tree_of(problem, strategy)
         task = tree.task  # with what the tree asks about what is believed
         assert keeps_to_its_conditions(task, tree.root, any_values(task, rng, amount(500, 2000)), rng)
         assert verify_tree(tree, Limits(), "own").problems == ()
@@ -109,7 +109,7 @@ def test_what_refinement_writes_reads_all_it_needs_by_itself(problem: Problem) -
 
 def test_what_a_limit_allows_is_guarded_too() -> None:
     (problem,) = [each for each in PROBLEMS if str(each) == "doors/to-the-lab"]
-    task = plan_of(problem).tree.task
+    task = tree_of(problem).task
     limits = Limits(nodes=12)
     tree = planned(task, "refine", Options(), limits)
     assert tree.status == "limit-reached"

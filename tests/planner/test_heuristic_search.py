@@ -155,8 +155,8 @@ def test_the_guess_for_many_states_at_a_time_is_that_for_each(of: Task) -> None:
     space = explore_space(of, Limits())
     found = Relaxation(of, Limits(), count_actions=True)
     operators = [each for n, a in enumerate(of.actions) for each in operators_of(n, a.factors)]
-    for row, guess in enumerate(found.estimate(space.packing, space.states).tolist()):
-        values = space.packing.values(space.states, row)
+    guesses = found.estimate(space.packing, space.states).tolist()
+    for values, guess in zip(space.packing.values(space.states), guesses, strict=True):
         costs = [float("inf")] * (3 * len(values))
         for variable, value in enumerate(values):
             costs[3 * variable + value] = 0.0

@@ -32,7 +32,7 @@ from bbtc.tree.nodes import (
 from bbtc.tree.validate import check_tree
 from bbtc.verifier.verdict import verify
 from tests.domains.brute_force import runs_of
-from tests.domains.problems import PROBLEMS, plan_of, task_of
+from tests.domains.problems import PROBLEMS, task_of, tree_of
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import nodes, tasks
@@ -118,7 +118,7 @@ def test_neighbours_that_are_equal(before: Node, attempts: list[int], nodes_less
 @pytest.mark.parametrize("name", ["kitting/gift-set", "household/grasp-soda", "warehouse/one-order"])
 def test_what_refinement_repeats_is_put_together_where_its_advice_is_taken(name: str) -> None:
     (problem,) = (each for each in PROBLEMS if str(each) == name)
-    published = plan_of(problem, "refine").tree
+    published = tree_of(problem, "refine")
     tree = plan_task(task_of(problem), None, "advised", Limits(), lambda _: None).tree
     assert list(retries_of(tree.root))
     assert size(tree.root) < size(published.root)
@@ -130,7 +130,7 @@ def test_what_refinement_repeats_is_put_together_where_its_advice_is_taken(name:
 def test_attempts_of_several_actions_are_one_and_run_as_before_in_both_engines() -> None:
     """Refinement inserts the template "find" twice, which looks at one table after the other."""
     (problem,) = (each for each in PROBLEMS if str(each) == "household/look-for-soda")
-    refined = plan_of(problem, "refine").tree
+    refined = tree_of(problem, "refine")
     root = repeats(refined.task, refined.root)
     ((again, attempts),) = retries_until_success_of(root)
     assert attempts == 2

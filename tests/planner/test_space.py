@@ -57,7 +57,7 @@ def by_simulator(task: Task) -> dict[Values, dict[Step, Fraction]]:
 
 def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
     found: dict[Values, dict[Step, Fraction]] = {}
-    values = [space.packing.values(space.states, row) for row in range(len(space.states))]
+    values = space.packing.values(space.states)
     for state, before in enumerate(values):
         assert before not in found, "a state stands twice"
         found[before] = {}
@@ -76,10 +76,9 @@ def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> Non
     space = explore_space(task, Limits())
     assert space.complete
     assert by_arrays(space) == by_simulator(task)
-    initial = {space.packing.values(space.states, s): p for p, s in space.initial}
-    assert initial == initial_belief(task)
-    for row, holds in enumerate(space.goal):
-        values = space.packing.values(space.states, row)
+    states = space.packing.values(space.states)
+    assert {states[number]: p for p, number in space.initial} == initial_belief(task)
+    for values, holds in zip(states, space.goal, strict=True):
         assert holds == (evaluate(task.goal, values) is Truth.TRUE)
 
 

@@ -282,7 +282,7 @@ def test_neighbours_stand_under_what_they_share() -> None:
 
 def unpacked(packing: Packing, state: int) -> tuple[Truth, ...]:
     """The values of a state."""
-    found = packing.values(packing.split([state]), 0)
+    (found,) = packing.values(packing.split([state]))
     return tuple(Truth(value) for value in found)
 
 

@@ -16,7 +16,8 @@ from bbtc.planner.subgoals import with_subgoals
 from bbtc.rewrite.simplify import numbered
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 from bbtc.tree.validate import check_tree
-from tests.domains.problems import PROBLEMS, Problem, plan_of
+from tests.domains.problems import PROBLEMS, Problem
+from tests.domains.problems import tree_of as planned_tree
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import trees
@@ -127,5 +128,5 @@ def test_names_change_nothing(tree: Tree) -> None:
 
 @pytest.mark.parametrize("problem", [p for p in PROBLEMS if p.name in ("night-round", "survey")], ids=str)
 def test_planned_trees_have_them(problem: Problem) -> None:
-    found = [name for name in names_of(plan_of(problem, "auto").tree.root) if name is not None]
+    found = [name for name in names_of(planned_tree(problem, "auto").root) if name is not None]
     assert {"night-round": "for patrolled(lobby)", "survey": "for at(cellar)"}[problem.name] in found

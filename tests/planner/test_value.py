@@ -147,7 +147,7 @@ def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Ta
     choices = choices_of(of)
     space = explore_space(of, Limits())
     within = horizon_values(space, 8, Limits())
-    values = [space.packing.values(space.states, s) for s in range(len(space.states))]
+    values = space.packing.values(space.states)
     for steps in (0, 1, 3, 8):
         expected = after_steps(of, choices, steps)
         assert list(within.values[steps]) == [expected[v] for v in values]

@@ -22,10 +22,27 @@ MANIFEST = """trees:
 """
 
 
+PLUGIN = ("-p", "bbtc" if INSTALLED else "bbtc.pytest_plugin", "-p", "no:cacheprovider")
+
+
 def collected(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    """Run pytest with the plugin, and without what this repository's tests configure."""
-    plugin = "bbtc" if INSTALLED else "bbtc.pytest_plugin"
-    return pytester.runpytest_subprocess("-p", plugin, "-p", "no:cacheprovider", *arguments)
+    """Run pytest with the plugin, and without what this repository's tests configure, in this process, which
+    has loaded both."""
+    return pytester.runpytest_inprocess(*PLUGIN, *arguments)
+
+
+def alone(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
+    """The same in a process of its own."""
+    return pytester.runpytest_subprocess(*PLUGIN, *arguments)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """What is loaded before stays when such a run ends; NumPy cannot be loaded twice."""
+    from bbtc.builder.runner import build
+
+    made = project(tmp_path_factory.mktemp("loaded"), MANIFEST, coin_pddl=COIN)
+    build(made / "bbtc.yaml", jobs=1)
 
 
 @pytest.fixture
@@ -38,7 +55,7 @@ def folder(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_every_tree_is_tested(pytester: pytest.Pytester, folder: Path) -> None:
-    result = collected(pytester, "--bbtc", "-v")
+    result = alone(pytester, "--bbtc", "-v")
     result.stdout.fnmatch_lines(
         [
             "bbtc.yaml::coin::figures PASSED*",
@@ -105,7 +122,7 @@ def test_an_export_that_behaves_otherwise_fails(pytester: pytest.Pytester, folde
         PyTreesReplay.run = lambda *arguments: replace(run(*arguments), status="failure")
         """
     )
-    result = collected(pytester, "--bbtc", "-k", "same-behaviour-py_trees")
+    result = alone(pytester, "--bbtc", "-k", "same-behaviour-py_trees")
     assert result.parseoutcomes()["failed"] == 1
     told = "run 1 (outcomes land between): expected throw(), success; py_trees did throw(), failure"
     assert told in result.outlines

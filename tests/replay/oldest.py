@@ -6,6 +6,8 @@ needs it is skipped.
 
 from __future__ import annotations
 
+import atexit
+import functools
 import os
 import pickle
 import subprocess
@@ -81,16 +83,24 @@ class OldestReplay:
         return found
 
 
+@functools.cache
+def _process() -> OldestPyTrees:
+    """One for all tests: it takes as long to load as many of them."""
+    process = OldestPyTrees()
+    atexit.register(process.close)
+    return process
+
+
 @contextmanager
 def oldest_py_trees() -> Iterator[OldestPyTrees]:
     """The process; skips the test where that version is not installed."""
     if not (FOLDER / "py_trees").is_dir():
         pytest.skip("no py_trees 2.2 in build/py_trees-2.2: `make build/py_trees-2.2/py_trees` puts it there")
-    process = OldestPyTrees()
     try:
-        yield process
-    finally:
-        process.close()
+        yield _process()
+    except BaseException:
+        _process.cache_clear()  # an answer may be on its way
+        raise
 
 
 def _answers() -> Iterator[object]:

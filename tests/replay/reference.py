@@ -57,6 +57,9 @@ class Ticking:
     """The attempts of retry-until-success nodes that have failed."""
     going: set[str] = field(default_factory=set)
     """Those of them that are running in this tick."""
+    below: dict[str, frozenset[str]] = field(default_factory=dict)
+    """The nodes of the tree by the one that they are below of, itself included, as far as they were asked
+    for."""
 
     def tick_all(self, root: Node) -> str:
         """One tick of a tree. What it does not leave running is halted."""
@@ -68,16 +71,21 @@ class Ticking:
 
     def halt(self, root: Node) -> None:
         """Every retry-until-success that is not running begins anew."""
+        if self.lost.keys() <= self.going:
+            return
         for node in walk(root):
             if node.id in self.lost and node.id not in self.going:
                 self.forget(node)
 
     def forget(self, node: Node) -> None:
         """Nothing is remembered of a node and of what is below it."""
-        for each in walk(node):
-            self.finished.discard(each.id)
-            self.tries.pop(each.id, None)
-            self.lost.pop(each.id, None)
+        if node.id not in self.below:
+            self.below[node.id] = frozenset(each.id for each in walk(node))
+        below = self.below[node.id]
+        self.finished -= below
+        for made in (self.tries, self.lost):
+            for each in below & made.keys():
+                del made[each]
 
     def until_success(self, node: ControlNode) -> str:
         """The status of the child, which is tried again where it fails."""
@@ -263,7 +271,9 @@ def _lively_values(run: Ticking, root: Node, rng: random.Random) -> Values:
     # Random outcomes end a tree soon: of a few, take one that keeps it going, most of the time.
     for _ in range(rng.choice([1, 6, 6, 6])):
         values = _random_values(run.task, rng, run.values)
-        ahead = Ticking(run.task, values, set(run.finished), dict(run.tries), lost=dict(run.lost))
+        ahead = Ticking(
+            run.task, values, set(run.finished), dict(run.tries), lost=dict(run.lost), below=run.below
+        )
         ahead.tick_all(root)
         if ahead.started is not None:
             break

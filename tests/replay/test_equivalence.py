@@ -2,13 +2,14 @@
 ticks, during the run of an action and within the tick that starts it, has the same actions in the
 same order, the same end, and the same final state.
 
-Usually 500 trees with those of at most 30 scenarios each (all of three trees in four) in which all happens
+Usually 256 trees with those of at most 30 scenarios each (all of three trees in four) in which all happens
 that happens in any, with one timing after the other, another one in each engine; ``BBTC_LONG=1`` takes 1,000
 trees and up to 500 scenarios, each with every timing.
 """
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 
@@ -24,9 +25,10 @@ from tests.replay.all_engines import ENGINES, Compared, EngineName, Runtime, eng
 from tests.replay.covering import covering
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import expected_run
+from tests.sharing import shared
 
 CHUNKS = 8
-TREES = amount(63, 125)
+TREES = amount(32, 125)
 """Trees of a chunk."""
 
 MOST = amount(30, 500)
@@ -35,9 +37,14 @@ MOST = amount(30, 500)
 TIMINGS: tuple[Timing, ...] = ("between", "during", "within")
 
 
-def lively_trees(chunk: int) -> Iterator[tuple[int, Tree, list[Scenario]]]:
+@functools.cache
+def lively_trees(chunk: int) -> list[tuple[int, Tree, list[Scenario]]]:
     """Random trees that end, each with its scenarios (see above), in one of
-    which at least three actions start; and a number for each."""
+    which at least three actions start; and a number for each. One worker of a test run finds them."""
+    return shared(f"lively-trees-{chunk}", lambda: list(_lively_trees(chunk)))
+
+
+def _lively_trees(chunk: int) -> Iterator[tuple[int, Tree, list[Scenario]]]:
     found = 0
     for seed in itertools.count(chunk, CHUNKS):
         tree = busy_tree(seed, starts=3)

@@ -34,16 +34,21 @@ from bbtc.source import SourceFile
 from bbtc.tree.monitor import FIRST, Monitor
 from bbtc.tree.nodes import Tree
 from tests.belief.hidden_tasks import search, tiger
-from tests.domains.problems import PROBLEMS, plan_of
+from tests.domains.problems import PROBLEMS, tree_of
 from tests.hidden.texts import texts
 from tests.long_form import amount
 from tests.profiles import examples
 from tests.replay.all_engines import ENGINES, Compared, EngineName, Make, engine
+from tests.sharing import shared
 
 HALF = Fraction(1, 2)
 ACCURACY = Fraction(17, 20)
 TREES = amount(8, 500)
 RUNS = amount(10, 100)
+
+
+def compiled(text: str) -> Task:
+    return compile_sources([SourceFile("x.pddl", text)], Report(), Limits())
 
 
 def first_told(task: Task) -> Task:
@@ -52,14 +57,6 @@ def first_told(task: Task) -> Task:
     observation = Observation(Is(0, Truth.TRUE), Fraction(3, 4))
     return replace(task, components=(replace(component, first=(observation,)),))
 
-
-HAND_MADE = {
-    "search": (search(3), Fraction(1)),
-    "noisy search": (search(2, HALF), Fraction(9, 10)),
-    "tiger": (tiger(ACCURACY, Fraction(99, 100)), HALF),
-    "counted tiger": (tiger(ACCURACY), Fraction(9, 10)),
-    "told first": (first_told(search(3)), Fraction(1)),
-}
 
 WINGS = """
 (define (domain wings)
@@ -77,9 +74,23 @@ WINGS = """
   (:goal (have)))
 """
 
+HAND_MADE = {
+    "search": (search(3), Fraction(1)),
+    "noisy search": (search(2, HALF), Fraction(9, 10)),
+    "tiger": (tiger(ACCURACY, Fraction(99, 100)), HALF),
+    "counted tiger": (tiger(ACCURACY), Fraction(9, 10)),
+    "told first": (first_told(search(3)), Fraction(1)),
+    "wings": (compiled(WINGS), Fraction(1)),
+}
 
-def compiled(text: str) -> Task:
-    return compile_sources([SourceFile("x.pddl", text)], Report(), Limits())
+
+@functools.cache
+def hand_made(name: str) -> tuple[Tree, Tree]:
+    """The trees of a task made by hand, planned in one worker of a test run."""
+    task, target = HAND_MADE[name]
+    pair = shared(f"hidden-{name}", lambda: planned(task, target))
+    assert pair is not None
+    return pair
 
 
 def planned(task: Task, target: Fraction = HALF, seconds: float = 20) -> tuple[Tree, Tree] | None:
@@ -91,7 +102,11 @@ def planned(task: Task, target: Fraction = HALF, seconds: float = 20) -> tuple[T
 
 @functools.cache
 def random_trees(wanted: int, *, noise: bool) -> list[tuple[Tree, Tree]]:
-    """Trees of random texts that need a monitor."""
+    """Trees of random texts that need a monitor, planned in one worker of a test run."""
+    return shared(f"hidden-random-{wanted}-{noise}", lambda: _random_trees(wanted, noise))
+
+
+def _random_trees(wanted: int, noise: bool) -> list[tuple[Tree, Tree]]:
     found: list[tuple[Tree, Tree]] = []
 
     @examples(12 * wanted)
@@ -125,18 +140,14 @@ def assert_replayed(tree: Tree, watched: Tree, make: Make) -> int:
 @pytest.mark.parametrize("name", ENGINES)
 def test_hand_made_trees_run_as_simulated(name: EngineName) -> None:
     with engine(name) as (_, make):
-        for task, target in HAND_MADE.values():
-            pair = planned(task, target)
-            assert pair is not None
-            assert assert_replayed(*pair, make) > 0
+        for each in HAND_MADE:
+            assert assert_replayed(*hand_made(each), make) >= len(TIMINGS)
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_bag_in_one_of_four_rooms_is_found(name: EngineName) -> None:
-    pair = planned(compiled(WINGS), Fraction(1))
-    assert pair is not None
     with engine(name) as (_, make):
-        assert assert_replayed(*pair, make) >= 4 * len(TIMINGS)
+        assert assert_replayed(*hand_made("wings"), make) >= 4 * len(TIMINGS)
 
 
 HIDDEN = {"corridors", "diagnosis", "press", "shelves"}
@@ -148,7 +159,7 @@ def test_trees_of_the_domains_run_as_simulated(name: EngineName) -> None:
         for problem in PROBLEMS:
             if problem.domain not in HIDDEN:
                 continue
-            tree = plan_of(problem).tree
+            tree = tree_of(problem)
             watched = with_monitor(tree, Limits())
             assert watched is not None or problem.domain == "corridors", problem
             if watched is not None:
@@ -224,11 +235,12 @@ DRIVER = """\
 #include <iostream>
 #include <map>
 #include <string>
-#include "monitor_table.hpp"
-
-int main() {
+#include "monitor.hpp"
+TABLES
+int main(int, char** argv) {
+  const std::vector<const std::vector<robot_tree::Part>*> tables = {LIST};
   std::map<std::string, int> seen;
-  robot_tree::Monitor monitor(robot_tree::monitorTable(), [&](const std::string& fact) {
+  robot_tree::Monitor monitor(*tables[std::stoi(argv[1])], [&](const std::string& fact) {
     const int value = seen[fact];
     return value == 1 ? std::nullopt : std::optional<bool>(value == 2);
   });
@@ -272,28 +284,42 @@ def test_every_edge_of_the_chain_is_in_the_table_of_cpp(tmp_path: Path) -> None:
     """For the table in C++, compiled by itself, and what is known in every state that the tree reaches."""
     if shutil.which("c++") is None:
         pytest.skip("no c++ on the PATH")
-    cases = [planned(task, target) for name, (task, target) in HAND_MADE.items() if name != "told first"]
-    cases += [planned(compiled(WINGS), Fraction(1)), *random_trees(amount(4, 40), noise=True)]
+    cases = [hand_made(name) for name in HAND_MADE if name != "told first"]
+    cases += random_trees(TREES, noise=True)[: amount(4, 40)]
+    driver = driver_of([watched for _, watched in cases], tmp_path)
     for number, pair in enumerate(cases):
-        assert pair is not None
-        check_in_cpp(*pair, tmp_path / str(number))
+        check_in_cpp(*pair, [driver, str(number)])
 
 
-def check_in_cpp(tree: Tree, watched: Tree, folder: Path) -> None:
-    folder.mkdir()
-    monitor = watched.monitor
-    assert monitor is not None
-    names = btcpp_names(watched)
-    table = MonitorTable(watched.task, names, monitor)
-    for name, text in monitor_files(watched.task, names, monitor, "robot_tree").items():
-        (folder / name).write_text(text, encoding="utf-8")
-    (folder / "driver.cpp").write_text(DRIVER, encoding="utf-8")
-    flags = ["-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+def driver_of(trees: list[Tree], folder: Path) -> Path:
+    """One program with the tables of some trees: compiled once, as that takes long."""
+    tables = []
+    for number, watched in enumerate(trees):
+        assert watched.monitor is not None
+        space = f"table{number}"
+        written = monitor_files(watched.task, btcpp_names(watched), watched.monitor, space)
+        (folder / f"{space}.hpp").write_text(written["monitor_table.hpp"], encoding="utf-8")
+        tables.append(f'namespace {space} {{ using robot_tree::Part; }}\n#include "{space}.hpp"\n')
+        if not number:
+            alone = monitor_files(watched.task, btcpp_names(watched), watched.monitor, "robot_tree")
+            (folder / "monitor.hpp").write_text(alone["monitor.hpp"], encoding="utf-8")
+    names = ", ".join(f"&table{number}::monitorTable()" for number in range(len(trees)))
+    text = DRIVER.replace("TABLES", "".join(tables)).replace("LIST", names)
+    (folder / "driver.cpp").write_text(text, encoding="utf-8")
+    flags = ["-std=c++17", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
     done = subprocess.run(
         ["c++", *flags, "driver.cpp", "-o", "driver"],
         cwd=folder, capture_output=True, text=True, check=False, timeout=300,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+    return folder / "driver"
+
+
+def check_in_cpp(tree: Tree, watched: Tree, driver: list[str | Path]) -> None:
+    monitor = watched.monitor
+    assert monitor is not None
+    names = btcpp_names(watched)
+    table = MonitorTable(watched.task, names, monitor)
     chain = explore(tree.task, tree.root, Limits())
     lines: list[str] = []
     expected: list[dict[int, Truth]] = []
@@ -310,7 +336,7 @@ def check_in_cpp(tree: Tree, watched: Tree, folder: Path) -> None:
     twice = [table.action(name) for name in monitor.readings if name != FIRST][:1] * 2
     lines += ["R", *(f"B {name}" for name in twice), "A"]
     said = subprocess.run(
-        [folder / "driver"], input="\n".join(lines) + "\n", capture_output=True, text=True, check=True
+        driver, input="\n".join(lines) + "\n", capture_output=True, text=True, check=True
     ).stdout.splitlines()
     *answers, last = said
     assert ("outside the model: " in last) == bool(twice)

@@ -3,8 +3,10 @@ docs/multi-tick-actions.md says."""
 
 from __future__ import annotations
 
+import functools
 import random
 from collections.abc import Callable, Hashable
+from itertools import repeat
 
 import pytest
 
@@ -12,17 +14,32 @@ from bbtc.limits import Limits
 from bbtc.pipeline import plan_task
 from bbtc.planner.options import Options
 from bbtc.replay.script import Values
-from tests.domains.problems import PROBLEMS, Problem, plan_of, task_of
+from bbtc.tree.nodes import Tree
+from tests.domains.problems import PROBLEMS, Problem, task_of, tree_of
 from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import Running, expected_ticks, value_of
-from tests.replay.ticks import TickWorld, random_script, trace
+from tests.replay.ticks import Tick, TickScript, TickWorld, random_script, trace
+from tests.sharing import shared
 
 TREES = amount(200, 2000)
 SCRIPTS = 5
 TICKS = 20
 """Ticks of a script; most trees end sooner."""
+
+
+@functools.cache
+def scripted_trees(*, endless: bool) -> list[tuple[Tree, list[tuple[TickScript, list[Tick]]]]]:
+    """Random trees, each with scripts and what the reference does with them, worked out in one worker of a
+    test run."""
+    return shared(f"scripted-trees-{endless}", lambda: list(map(_scripted, range(TREES), repeat(endless))))
+
+
+def _scripted(seed: int, endless: bool) -> tuple[Tree, list[tuple[TickScript, list[Tick]]]]:
+    tree, rng = busy_tree(seed, endless=endless), random.Random(seed)
+    scripts = [random_script(tree.task, rng, TICKS) for _ in range(SCRIPTS)]
+    return tree, [(script, expected_ticks(tree.task, tree.root, script)) for script in scripts]
 
 
 @pytest.mark.parametrize("endless", [False, True], ids=["ending", "endless"])
@@ -33,12 +50,9 @@ def test_every_tick_is_as_in_the_reference(
     count = dict.fromkeys(("started", "went_on", "cancelled"), 0)
     with engine(name) as (version, make):
         compared = Compared(record_property, f"actions of many ticks: reference and {version}")
-        for seed in range(TREES):
-            tree, rng = busy_tree(seed, endless=endless), random.Random(seed)
+        for seed, (tree, scripts) in enumerate(scripted_trees(endless=endless)):
             replay = make(tree, "imported")
-            for _ in range(SCRIPTS):
-                script = random_script(tree.task, rng, TICKS)
-                expected = expected_ticks(tree.task, tree.root, script)
+            for script, expected in scripts:
                 assert trace(replay, script) == expected, (seed, script, replay.source)
                 for kind in count:
                     count[kind] += sum(len(getattr(tick, kind)) for tick in expected)
@@ -75,9 +89,7 @@ def test_plans_run_as_in_the_reference_whatever_changes(
 ) -> None:
     with engine(name) as (version, make):
         compared = Compared(record_property, f"plans in restless worlds: reference and {version}")
-        for problem, tree in (
-            (p, tree) for p in QUICK for tree in (plan_of(p).tree, plan_of(p, "refine").tree)
-        ):
+        for problem, tree in ((p, tree) for p in QUICK for tree in (tree_of(p), tree_of(p, "refine"))):
             replay, rng = make(tree, "imported"), random.Random(1)
             for _ in range(10):
                 script = random_script(tree.task, rng, TICKS)
@@ -90,7 +102,7 @@ def test_plans_run_as_in_the_reference_whatever_changes(
 @pytest.mark.parametrize("options", [None, Options()], ids=["refine", "guarded"])
 @pytest.mark.parametrize("problem", QUICK, ids=str)
 def test_plans_are_sound_whatever_changes(problem: Problem, options: Options | None) -> None:
-    tree, rng = plan_of(problem, "refine").tree, random.Random(1)
+    tree, rng = tree_of(problem, "refine"), random.Random(1)
     if options is not None:
         tree = plan_task(tree.task, None, "auto", Limits(), lambda _: None, options=options).tree
     for _ in range(200):

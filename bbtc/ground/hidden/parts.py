@@ -51,7 +51,7 @@ def _take(parts: Parts, factor: gt.Factor) -> None:
             _take(parts, inner)
         return
     every = [dict.fromkeys(settings_of(outcome)) for outcome in factor.outcomes]
-    common = [setting for setting in every[0] if all(setting in each for each in every)]
+    common = {setting: None for setting in every[0] if all(setting in each for each in every)}
     parts.settings += common
     rest = [
         replace(outcome, effects=effects_of(setting for setting in settings if setting not in common))

@@ -25,6 +25,7 @@ from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.markov import weighted
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.chaining.choose import Candidate, Chooser, Flaw
 from bbtc.planner.chaining.draft import Draft, Subgoal, freeze, new_attempt
@@ -71,13 +72,15 @@ class _Refiner:
         chain = explore(self.task, frozen.root, self.limits, self.transitions)
         visits = Absorption(chain).visits()
         mass = {state: visits[state] or Fraction(0) for state in chain.final}
-        success = sum((p * chain.won(state) for state, p in mass.items()), Fraction(0))
+        success = weighted((p, chain.won(state)) for state, p in mass.items())
         goals = Fraction(0)
         if len(self.draft.goals) > 1:
             conditions = [goal.condition for goal in self.draft.goals]
-            for state, probability in mass.items():
-                values = chain.states[state].values
-                goals += probability * sum(evaluate(c, values) is Truth.TRUE for c in conditions)
+            true = [
+                sum(evaluate(each, chain.states[state].values) is Truth.TRUE for each in conditions)
+                for state in mass
+            ]
+            goals = weighted(zip(mass.values(), map(Fraction, true), strict=True))
         return Simulated(frozen, chain, mass, success, goals)
 
     def refine_once(self, simulated: Simulated) -> _Change | None:

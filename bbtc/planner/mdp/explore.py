@@ -174,9 +174,9 @@ class Explorer:
         """The edges (choice, draw, state after) with those of actions that are run as the
         simulator runs them."""
         owners, numbers, packed = [], [], []
-        for choice in np.flatnonzero(np.isin(actions, list(self.tables.by_reference))):
-            results = self.tables.reference_results(states, int(rows[choice]), int(actions[choice]))
-            for bits, number in results:
+        values = self.packing.values(states)
+        for choice in np.flatnonzero(np.isin(actions, list(self.tables.by_reference))).tolist():
+            for bits, number in self.tables.reference_results(values[rows[choice]], int(actions[choice])):
                 owners.append(choice)
                 numbers.append(number)
                 packed.append(bits)

@@ -37,10 +37,13 @@ def fully_observable(task: Task) -> Task | None:
     """The task in which all is seen; None where there are too many worlds to begin in, and where effects read
     what is known: to see more might then do less."""
     starts = prod((len(component.prior) for component in task.components), start=len(task.initial))
+    return None if starts > MOST_STARTS or reads_knowledge(task) else _Seeing(task).task()
+
+
+def reads_knowledge(task: Task) -> bool:
+    """Do effects read what is known? To know more might then do less."""
     known = {each.variable for component in task.components for each in component.known}
-    if starts > MOST_STARTS or any(not known.isdisjoint(_read(action)) for action in task.actions):
-        return None
-    return _Seeing(task).task()
+    return any(not known.isdisjoint(_read(action)) for action in task.actions)
 
 
 def _read(action: GroundAction) -> Iterator[int]:

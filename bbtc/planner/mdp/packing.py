@@ -129,10 +129,13 @@ class Packing:
             values[:, three] += bits[:, [at for at in self.unknown if at is not None]]
         return values
 
-    def values(self, states: Words, row: int) -> Values:
-        """One state as the rest of the program keeps it."""
-        values = bytes(self.unpack(states[row : row + 1])[0].tolist())
-        return values + self._belief_bytes(states, row) if self.beliefs else values
+    def values(self, states: Words) -> list[Values]:
+        """States as the rest of the program keeps them."""
+        octets, count = self.unpack(states).tobytes(), len(self.unknown)
+        found = [octets[row * count : (row + 1) * count] for row in range(len(states))]
+        if self.beliefs:
+            return [values + self._belief_bytes(states, row) for row, values in enumerate(found)]
+        return found
 
     def _belief_bytes(self, states: Words, row: int) -> bytes:
         bits = int.from_bytes(states[row].astype("<u8").tobytes(), "little") >> self._first_belief

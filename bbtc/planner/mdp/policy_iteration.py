@@ -8,18 +8,19 @@ won and else 0. MaxProb has no rewards; a least cost is the greatest reward wher
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fractions import Fraction
 
 import numpy as np
 
+from bbtc.ground.task import ONE, ZERO
 from bbtc.limits import Limits
-from bbtc.markov import Row, solve
+from bbtc.markov import Row, solve, weighted
 from bbtc.planner.mdp.graph import Floats, Graph, draw_probabilities, sums
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.state_space import Number
 from bbtc.rounding import rounded
 
-_ZERO = Fraction(0)
 _TIE = 1e-9  # floats closer than this may be equal
 _MOST_WORK = 400_000  # elimination steps of one loop of states
 _DOING = "the exact solution"
@@ -133,21 +134,31 @@ class Equations:
         return bool(gain)
 
     def _exact_value(self, choice: int, values: list[Fraction]) -> Fraction:
-        own, row = self._row(choice)
-        return own + sum((p * values[successor] for successor, p in row.items()), _ZERO)
+        """What a choice (numbered as in the space) is worth, where its states have these values."""
+        parts = []
+        for p, reward, number in self._outcomes(choice):
+            parts.append((p, reward))
+            if number >= 0:
+                parts.append((p, values[number]))
+        return weighted(parts)
 
     def _row(self, choice: int) -> tuple[Fraction, Row]:
-        """What a choice (numbered as in the space) is worth for itself, and its probabilities."""
-        space = self.graph.space
-        own = _ZERO
+        """What a choice is worth for itself, and its probabilities."""
+        own = []
         row: Row = {}
-        for successor, draw in space.outcomes(choice):
-            p = space.draws[draw].probability
-            if self.rewards is not None and self.rewards[draw]:
-                own += p * self.rewards[draw]
-            number = int(self.number[successor])
+        for p, reward, number in self._outcomes(choice):
+            own.append((p, reward))
             if number >= 0:
                 row[number] = row[number] + p if number in row else p
-            elif self.won[successor]:
-                own += p
-        return own, row
+        return weighted(own), row
+
+    def _outcomes(self, choice: int) -> Iterator[tuple[Fraction, Fraction, int]]:
+        """The probability of each outcome of a choice, its reward with what it wins outright, and its state
+        if that is one of these, else -1."""
+        space = self.graph.space
+        for successor, draw in space.outcomes(choice):
+            reward = ZERO if self.rewards is None else self.rewards[draw]
+            number = int(self.number[successor])
+            if number < 0 and self.won[successor]:
+                reward = reward + 1 if reward else ONE
+            yield space.draws[draw].probability, reward, number

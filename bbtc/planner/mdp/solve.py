@@ -16,6 +16,7 @@ from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
 from bbtc.planner.mdp.fully_observable import fully_observable
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
+from bbtc.planner.mdp.pomdp.solve import closed_in, highest, search_of
 from bbtc.planner.mdp.state_space import StateSpace
 
 FEW_STATES = 100_000
@@ -84,14 +85,30 @@ def _of_endless(
     task: Task, limits: Limits, target: Fraction | None, advice: Advice | None, *, whole: bool, verdict: bool
 ) -> Best:
     """The same, where there may be beliefs without end."""
-    highest = _seeing_all(task, limits.part(_SHARE))
-    found = _nearest(task, limits.part(_SHARE), target)
+    search = search_of(task, limits.part(_SHARE))
+    most = _seeing_all(task, limits.part(_SHARE))
+    most = most if search is None else min(most, highest(search))
+    found = _nearest(task, limits.part(_SHARE), None if target is None or target > most else target)
+    if found is None and whole:
+        replace(limits, states=FEW_BELIEFS).check_states(FEW_BELIEFS + 1, "exploration")
     if found is None:
-        if whole:
-            replace(limits, states=FEW_BELIEFS).check_states(FEW_BELIEFS + 1, "exploration")
-        searched = search_bounds(task, limits, target, verdict=verdict, advice=advice)
+        # Where the goal can be reached in every case, few beliefs may do, and what costs least among them.
+        few = (
+            limits if search is None else replace(limits.part(_SHARE), states=min(limits.states, FEW_BELIEFS))
+        )
+        searched = search_bounds(task, few, target, verdict=verdict, advice=advice)
         found = Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
-    bounds = Bounds(found.bounds.lower, max(found.bounds.lower, min(found.bounds.upper, highest)))
+    if search is not None and found.stop is not None:
+        closed = closed_in(search, limits, target, verdict=verdict)
+        better = closed.bounds.lower > found.bounds.lower
+        most = min(most, found.bounds.upper, closed.bounds.upper)
+        found = Best(
+            closed.found if better else found.found,
+            closed.bounds if better else found.bounds,
+            closed.stop,
+            closed.interrupted,
+        )
+    bounds = Bounds(found.bounds.lower, max(found.bounds.lower, min(found.bounds.upper, most)))
     return replace(found, bounds=bounds)
 
 
@@ -113,6 +130,8 @@ def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None
     if space.complete:
         found = max_prob(space, limits)
         return Best(found, found.initial)
+    if target is None:
+        return None
     few = replace(limits, states=min(limits.states, FEW_BELIEFS))
     for depth in count(1):
         space = explore_space(task, few, depth)
@@ -121,7 +140,7 @@ def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None
         found = max_prob(space, limits)
         if space.complete:
             return Best(found, found.initial)
-        if target is not None and found.initial.lower >= target:
+        if found.initial.lower >= target:
             upper = max_prob(space, limits, space.goal | space.fringe).initial.upper
             return Best(found, Bounds(found.initial.lower, upper))
     raise AssertionError("unreachable")

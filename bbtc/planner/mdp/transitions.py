@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from bbtc.belief.draws import Values
 from bbtc.belief.state import Transition, compile_action
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Charge, Effect, Factor, Task
@@ -321,10 +322,10 @@ class ActionTables:
             at = at[self.guard_count[outcomes[at]] > step]
         return (states & ~clear) | true | (unknown & ~kill)
 
-    def reference_results(self, states: Words, row: int, action: int) -> Iterator[tuple[int, int]]:
+    def reference_results(self, values: Values, action: int) -> Iterator[tuple[int, int]]:
         """Packed state and number of the figures of each result of an action with very many
         joint outcomes, as the simulator computes them."""
-        for result in self.by_reference[action](self.packing.values(states, row)):
+        for result in self.by_reference[action](values):
             draw = Draw(result.probability, result.cost, result.reward)
             yield self.packing.pack(result.values), self.draw_number(draw)
 

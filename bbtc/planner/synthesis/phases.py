@@ -10,7 +10,7 @@ node of its own.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,8 +18,12 @@ from bbtc.limits import Limits
 from bbtc.planner.mdp.finite_horizon import Horizon, best_choices, cheapest_choices
 from bbtc.planner.mdp.graph import Graph, draw_probabilities
 from bbtc.planner.mdp.packing import Flags
+from bbtc.planner.mdp.state_space import Number, StateSpace
 from bbtc.planner.mdp.transitions import Index
 from bbtc.planner.synthesis.permissive import MultiPolicy, multi_policy
+
+_MOST_STEPS = 1_000
+_NEVER = 1e-9  # states that are less probable are given up
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +95,11 @@ def _phases(horizon: Horizon, graph: Graph, best: list[Flags], limits: Limits) -
         parts.append(_Part(steps, offered, inside, np.union1d(entry, np.flatnonzero(ended))))
         left -= steps
         entry = leaving
+    return _assembled(space, parts)
+
+
+def _assembled(space: StateSpace, parts: list[_Part]) -> list[Phase]:
+    """The phases, each with all states that it reads."""
     later = np.empty(0, dtype=np.int64)
     found: list[Phase] = []
     for part in reversed(parts):
@@ -98,6 +107,55 @@ def _phases(horizon: Horizon, graph: Graph, best: list[Flags], limits: Limits) -
         found.append(Phase(part.steps, multi_policy(space, part.offered, read, part.inside)))
         later = space.closure(read, part.offered & part.inside[space.choice_state])
     return found[::-1]
+
+
+def by_count(space: StateSpace, policy: Number, enough: float, limits: Limits) -> list[Phase]:
+    """Phases of a policy in which states that read alike have the same choice, the one that the policy takes
+    after so many actions: for states that only beliefs tell apart. They go on until the goal is reached with
+    a probability of ``enough``, or nothing is done any more; where states that read alike want different
+    actions after equally many, the more probable ones have theirs. Raises ``LimitReached`` when the time is
+    over."""
+    values = [row.tobytes() for row in space.packing.unpack(space.states)]
+    chance = draw_probabilities(space)
+    mass = dict.fromkeys(space.start.tolist(), 0.0)
+    for probability, state in space.initial:
+        mass[state] += float(probability)
+    parts: list[_Part] = []
+    doing: dict[bytes, int] = {}
+    attained = 0.0
+    ended = np.zeros(len(policy), dtype=np.bool_)
+    for _ in range(_MOST_STEPS):
+        limits.check_time("the search for a policy")
+        attained += sum(p for state, p in mass.items() if space.goal[state])
+        ended[[state for state in mass if policy[state] < 0 and not space.goal[state]]] = True
+        going = sorted(
+            (state for state, p in mass.items() if policy[state] >= 0 and p > _NEVER),
+            key=lambda state: -mass[state],
+        )
+        if not going or attained >= enough:
+            break
+        wanted: dict[bytes, int] = {}
+        for state in going:
+            wanted.setdefault(values[state], int(space.choice_action[policy[state]]))
+        if not parts or any(doing.get(read, action) != action for read, action in wanted.items()):
+            offered, inside = (np.zeros(n, dtype=np.bool_) for n in (len(space.choice_action), len(policy)))
+            parts.append(_Part(0, offered, inside, np.array(sorted(mass), dtype=np.int64)))
+            doing = {}
+        doing |= wanted
+        part, after = parts[-1], dict[int, float]()
+        for state in going:
+            choice = int(policy[state])
+            if space.choice_action[choice] != doing[values[state]]:
+                continue
+            part.offered[choice] = part.inside[state] = True
+            edges = space.edges_of(np.array([choice]))
+            for edge, successor in zip(edges.tolist(), space.edge_successor[edges].tolist(), strict=True):
+                after[successor] = after.get(successor, 0.0) + mass[state] * float(chance[edge])
+        parts[-1] = replace(part, steps=part.steps + 1)
+        mass = after
+    for part in parts:  # wherever a run has ended, or would at a later time, nothing starts
+        part.inside[ended] = True
+    return _assembled(space, parts)
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ from bbtc.planner.synthesis.permissive import (
     likely_way,
     one_policy,
 )
-from bbtc.planner.synthesis.phases import Phase, likely_way_within, phases
+from bbtc.planner.synthesis.phases import Phase, by_count, likely_way_within, phases
 from bbtc.planner.synthesis.tree import in_phases, one_after_another, synthesize
 from bbtc.rewrite.retry import longest_run
 from bbtc.rewrite.shrink import shrunk
@@ -47,6 +47,7 @@ LARGE_POLICY = 1000
 
 _ENOUGH = 1000  # states that the simulation of what is fallen back on may have, whatever the limit
 _DRAFTS = (1000, 50)  # states of a policy that a tree is made of, if one of all has too many nodes
+_ALLOWANCE = Fraction(1, 1000)  # success given up for a tree that counts to an end
 _CLOSE = Fraction(1, 10**8)  # probabilities closer than this differ by rounding
 
 
@@ -93,9 +94,17 @@ class _Search:
         policy = self._cheapest(best.found, limits)
         self.wider = with_beliefs(self.task, policy)
         if self.wider is not None:
-            return  # no tree can follow it that cannot ask
+            self._by_count(best.found, limits)
+            return  # no tree can follow it that can neither ask nor count
         self._keep(synthesize(self.task, policy, limits), limits)
         finish(self.best, limits, self.options)
+
+    def _by_count(self, found: MaxProb, limits: Limits) -> None:
+        """A tree that counts its actions where it cannot ask."""
+        enough = min(self.target, found.initial.lower) - _ALLOWANCE
+        parts = by_count(found.space, found.policy, float(enough), limits)
+        with suppress(LimitReached):
+            self._keep(in_phases(self.task, [(part.steps, part.policy) for part in parts], limits), limits)
 
     def _cheapest(self, found: MaxProb, limits: Limits) -> MultiPolicy:
         """The cheapest of the best policies, or one of the best if there is no time to find it."""
@@ -214,16 +223,29 @@ def plan_policy(
         task, target, limits, options, BestTree.start(task, target, options.best, goal, limits), whole, advice
     )
     search.run()
+    asking: Plan | None = None
     if search.wider is not None and not search.interrupted:
         with suppress(LimitReached):
             inner = replace(options, best=None)
-            return plan_policy(search.wider, target, limits, progress, inner, whole=whole, advice=advice)
-    if whole and search.stop is not None:
+            asking = plan_policy(search.wider, target, limits, progress, inner, whole=whole, advice=advice)
+    if whole and search.stop is not None and asking is None:
         raise LimitReached([search.stop])
     plan = search.best.plan("interrupted" if search.interrupted else "limit-reached", search.stop)
+    if asking is not None and not _beats(plan, asking):
+        return asking
     lower = max(search.bounds.lower, plan.figures.success)
     upper = max(search.bounds.upper, lower)
     status = plan.tree.status
     if status == "limit-reached" and upper < target:
         status = "out-of-reach"
     return replace(plan, tree=replace(plan.tree, status=status, bounds=(lower, upper)))
+
+
+def _beats(counting: Plan, asking: Plan) -> bool:
+    """Does a tree that counts do better than one that asks, or as well at no more cost, with fewer nodes?"""
+    target = asking.tree.target
+    more = min(target, counting.figures.success) - min(target, asking.figures.success)
+    costs = counting.figures.cost, asking.figures.cost
+    cheap = costs[1] is None or (costs[0] is not None and costs[0] <= costs[1])
+    small = size(counting.tree.root) < size(asking.tree.root)
+    return more > _ALLOWANCE or (more > -_ALLOWANCE and cheap and small)
