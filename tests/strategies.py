@@ -296,7 +296,9 @@ def nodes(draw: st.DrawFn, task: Task, depth: int = 3) -> Node:
                 return ConditionNode(name, draw(conditions(task.variables)), draw(_LABELS), draw(_LABELS))
             case "action":
                 action = draw(st.sampled_from(task.actions)).name
-                return ActionNode(name, action, draw(st.booleans()), draw(st.booleans()), reason=draw(_LABELS))
+                return ActionNode(
+                    name, action, draw(st.booleans()), draw(st.booleans()), reason=draw(_LABELS)
+                )
             case _:
                 if not draw(st.integers(0, 4)):
                     child = node(level - 1, passive)
