@@ -66,6 +66,7 @@ HOSTILE_NAMES = st.one_of(
     ),
     st.text(st.characters(exclude_categories=["Cs"]), max_size=8),
 )
+_LABELS = st.none() | HOSTILE_NAMES
 CONTROL_KINDS: list[ControlKind] = ["sequence", "fallback", "skipper"]
 _RETRIES: st.SearchStrategy[ControlKind] = st.sampled_from(["retry", "retry-until-success"])
 BODY_KINDS: list[Literal["sequence", "fallback", "skipper"]] = ["sequence", "fallback", "skipper"]
@@ -282,7 +283,6 @@ def _body(
 def nodes(draw: st.DrawFn, task: Task, depth: int = 3) -> Node:
     """A tree of nodes on a task, obeying the Skipper rule, with ids ``n1``, ``n2``, …"""
     counter = iter(range(1, 10_000))
-    labels = st.none() | HOSTILE_NAMES
 
     def node(level: int, passive: bool) -> Node:
         name = f"n{next(counter)}"
@@ -293,21 +293,21 @@ def nodes(draw: st.DrawFn, task: Task, depth: int = 3) -> Node:
             shapes += ["control"] * 3
         match draw(st.sampled_from(shapes)):
             case "condition":
-                return ConditionNode(name, draw(conditions(task.variables)), draw(labels), draw(labels))
+                return ConditionNode(name, draw(conditions(task.variables)), draw(_LABELS), draw(_LABELS))
             case "action":
                 action = draw(st.sampled_from(task.actions)).name
-                return ActionNode(name, action, draw(st.booleans()), draw(st.booleans()), reason=draw(labels))
+                return ActionNode(name, action, draw(st.booleans()), draw(st.booleans()), reason=draw(_LABELS))
             case _:
                 if not draw(st.integers(0, 4)):
                     child = node(level - 1, passive)
                     attempts = draw(st.integers(1, 3))
-                    return ControlNode(name, draw(_RETRIES), (child,), draw(labels), attempts=attempts)
+                    return ControlNode(name, draw(_RETRIES), (child,), draw(_LABELS), attempts=attempts)
                 kind = draw(st.sampled_from(CONTROL_KINDS))
                 count = draw(st.integers(1, 3))
                 children = tuple(
                     node(level - 1, passive or (kind == "skipper" and i < count - 1)) for i in range(count)
                 )
-                return ControlNode(name, kind, children, template=draw(labels), reason=draw(labels))
+                return ControlNode(name, kind, children, template=draw(_LABELS), reason=draw(_LABELS))
 
     return node(depth, False)
 

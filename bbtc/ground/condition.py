@@ -27,25 +27,55 @@ class Known:
     variable: int
 
 
+class _Compound:
+    """Remembers its hash: it is often asked for, and conditions may be deep."""
+
+    __slots__ = ("_hash",)
+    _hash: int
+
+    def __hash__(self) -> int:
+        try:
+            return self._hash
+        except AttributeError:
+            found = hash((type(self), self._within()))
+            object.__setattr__(self, "_hash", found)
+            return found
+
+    def _within(self) -> object:
+        raise NotImplementedError
+
+
 @dataclass(frozen=True, slots=True)
-class And:
+class And(_Compound):
     """Kleene conjunction: the minimum."""
 
     parts: tuple[Condition, ...]
+    __hash__ = _Compound.__hash__
+
+    def _within(self) -> object:
+        return self.parts
 
 
 @dataclass(frozen=True, slots=True)
-class Or:
+class Or(_Compound):
     """Kleene disjunction: the maximum."""
 
     parts: tuple[Condition, ...]
+    __hash__ = _Compound.__hash__
+
+    def _within(self) -> object:
+        return self.parts
 
 
 @dataclass(frozen=True, slots=True)
-class Not:
+class Not(_Compound):
     """Kleene negation."""
 
     part: Condition
+    __hash__ = _Compound.__hash__
+
+    def _within(self) -> object:
+        return self.part
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,7 +126,7 @@ main()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("moment", range(1, 700, 1 if LONG else 50))
+@pytest.mark.parametrize("moment", range(1, 700, 1 if LONG else 100))
 def test_ctrl_c_while_modules_load_is_status_130(folder: Path, moment: int) -> None:
     command = [sys.executable, "-c", _INTERRUPTED, str(moment), "plan", "coin.pddl", "--target", "0.5"]
     done = subprocess.run(

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import functools
+
 from hypothesis import strategies as st
 
-HIDDEN = ["h", "i", "j"]
-SEEN = ["s", "t"]
+HIDDEN = ("h", "i", "j")
+SEEN = ("s", "t")
+ATOMS = (*HIDDEN, *SEEN)
 
 
-def _literal(atoms: list[str]) -> st.SearchStrategy[str]:
+@functools.cache  # to make a strategy takes longer than to draw from it
+def _literal(atoms: tuple[str, ...]) -> st.SearchStrategy[str]:
     return st.builds(lambda atom, true: f"({atom})" if true else f"(not ({atom}))",
                      st.sampled_from(atoms), st.booleans())  # fmt: skip
 
 
-def _condition(atoms: list[str]) -> st.SearchStrategy[str]:
+@functools.cache
+def _condition(atoms: tuple[str, ...]) -> st.SearchStrategy[str]:
     literal = _literal(atoms)
     several = st.lists(literal, min_size=2, max_size=2)
     joined = st.builds(
@@ -23,8 +28,9 @@ def _condition(atoms: list[str]) -> st.SearchStrategy[str]:
     return st.one_of(literal, literal, joined, joined, denied)
 
 
+@functools.cache
 @st.composite
-def _needs(draw: st.DrawFn, atoms: list[str]) -> str:
+def _needs(draw: st.DrawFn, atoms: tuple[str, ...]) -> str:
     """A precondition: now and then it asks what is known."""
     found = draw(_condition(atoms))
     if draw(st.integers(0, 5)):
@@ -32,6 +38,7 @@ def _needs(draw: st.DrawFn, atoms: list[str]) -> str:
     return f"(and ({draw(st.sampled_from(['known', 'unknown']))} ({draw(st.sampled_from(HIDDEN))})) {found})"
 
 
+@functools.cache
 @st.composite
 def _effect(draw: st.DrawFn) -> str:
     parts = []
@@ -42,11 +49,11 @@ def _effect(draw: st.DrawFn) -> str:
         if kind == 3 and not draw(st.integers(0, 2)):
             target = f"(unknown ({draw(st.sampled_from(HIDDEN))}))"
         elif kind == 0:
-            target = f"(when {draw(_condition([*HIDDEN, *SEEN]))} {target})"
+            target = f"(when {draw(_condition(ATOMS))} {target})"
         elif kind == 1:
             target = f"(probabilistic 1/3 {target})"
         elif kind == 2:
-            target = f"(oneof {target} {draw(_literal([*HIDDEN, *SEEN]))})"
+            target = f"(oneof {target} {draw(_literal(ATOMS))})"
         parts.append(target)
     return f"(and {' '.join(parts)})"
 
@@ -56,19 +63,23 @@ def _is_clause(condition: str) -> bool:
     return condition.startswith(("(or", "(imply", "(not (and", "(not (or", "(not (imply"))
 
 
+@functools.cache
+def _clause() -> st.SearchStrategy[str]:
+    return _condition(("i", "j")).filter(_is_clause)
+
+
 @st.composite
 def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
     """A domain and a problem with up to three hidden facts and two seen ones. With ``noise``, some readings
     may be wrong."""
-    atoms = [*HIDDEN, *SEEN]
     actions = []
     for number in range(draw(st.integers(2, 5))):
         form = f"(:action a{number}"
         if draw(st.booleans()):
-            form += f" :precondition {draw(_needs(atoms))}"
+            form += f" :precondition {draw(_needs(ATOMS))}"
         kind = draw(st.integers(0, 3))
         if kind < 3:
-            told = draw(_condition(HIDDEN)) if draw(st.booleans()) else f"({draw(st.sampled_from(atoms))})"
+            told = draw(_condition(HIDDEN)) if draw(st.booleans()) else f"({draw(st.sampled_from(ATOMS))})"
             if noise and draw(st.booleans()):
                 told = f"(probabilistic 3/4 ({draw(st.sampled_from(HIDDEN))}))"
             form += f" :observe {told}"
@@ -85,7 +96,7 @@ def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
         init.append(f"(oneof {' '.join(f'({atom})' for atom in HIDDEN)})")
     elif kind == 2:
         init = [each for each in init if each[1] in "ust"]
-        init.append(f"(or (h) {draw(_literal(['i', 'j']))})")
+        init.append(f"(or (h) {draw(_literal(('i', 'j')))})")
     elif kind == 3:
         init = [each for each in init if each != "(h)" and each != "(unknown (h))"]
         init.append("(probabilistic 1/4 (h))")
@@ -94,13 +105,13 @@ def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
         init.append("(oneof (and (h) (i)) (and (i) (j)) (h))")
     elif kind == 5:
         init = [each for each in init if each[1] in "ust"]
-        init.append(f"(probabilistic 1/4 (h) 1/3 (i)) {draw(_condition(['i', 'j']).filter(_is_clause))}")
+        init.append(f"(probabilistic 1/4 (h) 1/3 (i)) {draw(_clause())}")
     elif kind == 6:
         init = [each for each in init if each[1] in "ust"]
         init.append("(probabilistic 1/2 (h)) (probabilistic 1/3 (and (h) (j)) 1/3 (i)) (unknown (j))")
-    goal = " ".join(draw(st.lists(_literal(atoms), min_size=1, max_size=2, unique_by=lambda each: each[-4:])))
+    goal = " ".join(draw(st.lists(_literal(ATOMS), min_size=1, max_size=2, unique_by=lambda each: each[-4:])))
     return (
-        f"(define (domain d) (:predicates {' '.join(f'({atom})' for atom in atoms)})\n  "
+        f"(define (domain d) (:predicates {' '.join(f'({atom})' for atom in ATOMS)})\n  "
         + "\n  ".join(actions)
         + "\n  (:action mark :observe (h)))\n"
         f"(define (problem x) (:domain d) (:init {' '.join(init)}) (:goal (and {goal})))"

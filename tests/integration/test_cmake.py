@@ -108,6 +108,7 @@ def configure(source: Path, generator: str) -> Path:
         generator,
         f"-DCMAKE_MAKE_PROGRAM={make}",
         f"-Dbbtc_DIR={CMAKE_DIR}",
+        "-DCMAKE_CXX_COMPILER_WORKS=1",  # what is compiled below shows it
         f"-DBBTC_EXECUTABLE={executable}",
         cwd=source,
     )

@@ -153,7 +153,7 @@ def started(*arguments: str) -> subprocess.Popen[str]:
 def test_a_signal_ends_the_program_with_a_tree(
     endless: list[str], strategy: str, number: signal.Signals
 ) -> None:
-    for seconds in (0.0, 1.0) if not LONG else [each / 4 for each in range(24)]:
+    for seconds in (0.0, 0.5) if not LONG else [each / 4 for each in range(24)]:
         process = started(*endless, "--strategy", strategy)
         time.sleep(seconds)
         process.send_signal(number)
@@ -176,11 +176,11 @@ def test_more_signals_do_not_keep_the_tree_from_being_written(endless: list[str]
 def test_a_time_limit_ends_the_program_with_a_tree(endless: list[str]) -> None:
     started_at = time.monotonic()
     done = subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", *endless, "-q", "--time-limit", "3", "--strategy", "refine"],
+        [sys.executable, "-m", "bbtc.cli.main", *endless, "-q", "--time-limit", "1", "--strategy", "refine"],
         capture_output=True, text=True, check=False, cwd=REPOSITORY, timeout=300,
     )  # fmt: skip
     assert done.returncode == 3, done.stderr
-    assert "the time limit of 3 s ended" in done.stderr
+    assert "the time limit of 1 s ended" in done.stderr
     assert json.loads(Path(endless[-1]).read_text())["status"] == "limit-reached"
     assert time.monotonic() - started_at < 60
 

@@ -215,7 +215,7 @@ def test_a_signal_ends_planning_with_a_tree(tmp_path: Path, number: signal.Signa
     )
     assert run.stderr is not None
     run.stderr.readline()  # planning has begun
-    time.sleep(1)
+    time.sleep(0.3)
     run.send_signal(number)
     out, err = run.communicate(timeout=60)
     assert run.returncode == 130, err

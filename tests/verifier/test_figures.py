@@ -63,7 +63,7 @@ def disagreements(tree: Tree, found: Recomputed) -> dict[str, tuple[Fraction | N
 # --- random trees ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("first", range(0, amount(150, 5000), 50))
+@pytest.mark.parametrize("first", range(0, amount(100, 5000), 50))
 def test_random_trees_full_of_actions(first: int) -> None:
     for seed in range(first, first + 50):
         tree = random_tree(seed, latched=0.85 if seed % 2 else 0.5)
@@ -72,7 +72,7 @@ def test_random_trees_full_of_actions(first: int) -> None:
             assert disagreements(tree, found) == {}, (seed, form, most)
 
 
-@pytest.mark.parametrize("first", range(0, amount(100, 3000), 50))
+@pytest.mark.parametrize("first", range(0, amount(50, 3000), 50))
 def test_random_trees_that_try_again(first: int) -> None:
     for seed in range(first, first + 50):
         tree = with_attempts(random_tree(seed, latched=0.85 if seed % 2 else 0.5), seed)
@@ -81,7 +81,7 @@ def test_random_trees_that_try_again(first: int) -> None:
             assert disagreements(tree, found) == {}, (seed, form, most)
 
 
-@examples(amount(90, 3000))
+@examples(amount(60, 3000))
 @given(tree=trees())
 def test_trees_on_tasks_with_every_construct(tree: Tree) -> None:
     """Chance in chance, several factors, conditional effects, costs and rewards of outcomes."""

@@ -84,7 +84,7 @@ def test_every_word_of_the_languages_can_be_a_name_in_a_tree() -> None:
     here, there = (ConditionNode(word, Is(number, Truth.TRUE)) for number, word in enumerate(["a b", "b a"]))
     tests = tuple(
         ControlNode(name, "fallback", (replace(here, id=f"{name} x"), replace(there, id=f"{name} y")))
-        for name in spellings()[:: amount(13, 1)]
+        for name in spellings()[:: amount(26, 1)]
     )
     go = ControlNode("end module", "fallback", (there, ActionNode("endmodule action", "endmodule()")))
     root = ControlNode("endmodule ends", "sequence", (*tests, go))

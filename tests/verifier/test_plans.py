@@ -46,7 +46,7 @@ def check(tree: Tree) -> None:
         assert (low == high) == answer["exact"]  # more states than that are solved in floats, with bounds
 
 
-@examples(amount(60, 2000))
+@examples(amount(40, 2000))
 @given(
     task=tasks(),
     strategy=st.sampled_from(list(STRATEGIES)),
