@@ -214,7 +214,8 @@ def simulate(tree: Source | Tree | Plan, *, limits: Limits | None = None) -> Fig
     """
     from bbtc import pipeline
 
-    return pipeline.simulate_tree(_tree(tree, limits), limits or Limits())[0]
+    limits, known = limits or Limits(), _tree(tree, limits)
+    return pipeline.with_worst_world(known, pipeline.simulate_tree(known, limits)[0], limits)
 
 
 def perturb(

@@ -135,6 +135,10 @@ _CODES = (
     Code("BBT0415", "too many worlds"),
     Code("BBT0416", "condition that mixes too much"),
     Code("BBT0417", "observation that tells nothing", _WARNING),
+    Code("BBT0418", "choice without branches"),
+    Code("BBT0419", "repeats without noise", _WARNING),
+    Code("BBT0420", "belief that cannot be asked for"),
+    Code("BBT0421", "model of observation that is not read"),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

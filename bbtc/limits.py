@@ -23,6 +23,9 @@ class Stage:
 
 Watcher: TypeAlias = Callable[[Stage], None]
 
+MOST_WORLDS = 4096
+"""So many worlds a component of hidden facts may have, and a draw of the start so many results."""
+
 PLANNING_SECONDS = 60.0
 """The time that planning may take unless somebody says otherwise."""
 

@@ -401,7 +401,10 @@ def ground_model(model: Model, report: Report, limits: Limits, reading: Reading 
     if not task.components or reading.keep_hidden:
         return task
     from bbtc.belief.lowering import lowered
+    from bbtc.planner.stopping import doubtful_goal
 
+    if doubtful_goal(task):
+        return task
     return lowered(task, limits)
 
 
@@ -427,6 +430,7 @@ def plan_task(
     limits do not allow any tree at all.
     """
     from bbtc.belief.chain import explore
+    from bbtc.belief.rerolled import rerolled
     from bbtc.belief.soundness import violations
     from bbtc.planner.best_tree import BestTree
     from bbtc.planner.bounds import judged, unjudged
@@ -440,10 +444,9 @@ def plan_task(
     options = options or DEFAULTS
     stopping = None
     if task.components:
-        from bbtc.planner.stopping import Stopping, doubtful_goal
+        from bbtc.planner.stopping import stopping_of
 
-        if options.allow_guess or doubtful_goal(task):
-            stopping = Stopping.of(task, anywhere=options.allow_guess)
+        stopping = stopping_of(task, options)
     task = task if stopping is None else stopping.task
     best = BestTree(task, wanted, options.prefer == "size")
     searching = limits.but_for(_LAST_STEPS)
@@ -470,10 +473,13 @@ def plan_task(
     task = plan.tree.task
     plan = replace(plan, tree=replace(plan.tree, root=with_subgoals(task, plan.tree.root)))
     check_tree(plan.tree)
-    broken = violations(task, plan.chain or explore(task, plan.tree.root, Limits(states=limits.states)))
+    chain = plan.chain or explore(task, plan.tree.root, Limits(states=limits.states))
+    broken = violations(task, chain)
     if broken:
         raise AssertionError(f"unsound tree: {'; '.join(broken)}")
-    return replace(plan, chain=None)
+    few = Limits(states=min(limits.states, _STATES_OF_WORLDS // 4))
+    found = with_worst_world(plan.tree, plan.figures, few)
+    return replace(plan, figures=found, rerolled=rerolled(task, chain), chain=None)
 
 
 def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
@@ -483,6 +489,24 @@ def simulate_tree(tree: Tree, limits: Limits) -> tuple[Figures, Chain]:
 
     chain = explore(tree.task, tree.root, limits)
     return figures(tree.task, tree.root, chain), chain
+
+
+_STATES_OF_WORLDS = 20_000
+"""So many states are looked at to find the worst world, after planning a quarter of them."""
+
+
+def with_worst_world(tree: Tree, figures: Figures, limits: Limits) -> Figures:
+    """The figures with what the tree attains in the worst world that hidden facts may make at the start, as
+    far as the limits allow."""
+    from bbtc.belief.worst_world import WorstWorld, with_worlds, worst_world
+
+    if figures.success == 1 and with_worlds(tree.task) is not None:
+        return replace(figures, worst=WorstWorld(figures.success, (), frozenset()))
+    limits = replace(limits, states=min(limits.states, _STATES_OF_WORLDS))
+    try:
+        return replace(figures, worst=worst_world(tree.task, tree.root, limits))
+    except LimitReached:
+        return figures
 
 
 def process_text(task: Task, form: str) -> str:

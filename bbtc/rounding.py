@@ -29,6 +29,20 @@ def figure_text(value: Fraction) -> str:
     return numerator if value.denominator == 1 else f"{numerator}/{digits(value.denominator)}"
 
 
+def short_text(value: Fraction) -> str:
+    """A number as a decimal fraction, ``0.95``, where it is one; else as it is, ``2/3``."""
+    rest = value.denominator
+    for factor in (2, 5):
+        while rest % factor == 0:
+            rest //= factor
+    if rest > 1:
+        return figure_text(value)
+    count = 0
+    while (value * 10**count).denominator > 1:
+        count += 1
+    return decimal(value, count)
+
+
 def digits(value: int) -> str:
     """A whole number from 0 on."""
     chunks: list[str] = []

@@ -86,10 +86,11 @@ def _unread(known: Known) -> Iterator[tuple[md.Predicate, bool]]:
     read = {atom.predicate for formula in known.conditions for atom in mf.atoms(formula)}
     for schema in model.schemas.values():
         read |= facts.observed(schema)
+    read |= {atom.predicate for asked in model.thresholds.values() for atom in mf.atoms(asked.condition)}
     written = {leaf.predicate for schema in model.schemas.values() for leaf in me.settings(schema.effect)}
     written |= {rule.predicate for rule in model.rules}
     for name, predicate in model.predicates.items():
-        if name not in read:
+        if name not in read and name not in model.symbols:
             yield predicate, name in written
 
 
@@ -149,7 +150,7 @@ def _untold(known: Known, lost: Collection[str]) -> Iterator[mf.Reading]:
     that nothing ever tells."""
     model = known.model
     told = _set_to(model, unknown=False) | {
-        atom.predicate for sensor in model.sensors for atom in mf.atoms(sensor.sensed)
+        atom.predicate for sensor in model.sensors for atom in mf.atoms(md.facts_told(sensor.sensed))
     }
     for schema in model.schemas.values():
         told |= facts.observed(schema)
@@ -163,7 +164,7 @@ def _untold(known: Known, lost: Collection[str]) -> Iterator[mf.Reading]:
         predicate = model.predicates[reading.atom.predicate]
         if reading.value is Truth.UNKNOWN or predicate.name not in lost or predicate.name in told:
             continue
-        if not predicate.derived and not predicate.external:
+        if not predicate.derived and not predicate.external and predicate.name not in model.thresholds:
             told.add(predicate.name)
             yield reading
 
@@ -308,7 +309,7 @@ def _duplicates(known: Known) -> Iterator[Diagnostic]:
 
 def _without_effect(known: Known) -> Iterator[Diagnostic]:
     for name, schema in known.model.schemas.items():
-        if schema.observe is None and next(me.settings(schema.effect), None) is None:
+        if not schema.tells and next(me.settings(schema.effect), None) is None:
             yield Diagnostic("BBT0306", f"action `{name}` changes nothing", schema.span)
 
 
@@ -379,18 +380,22 @@ def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
 def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
     """Whether renaming the parameter changes the action."""
     renamed = _renamed(schema, {parameter.name: other.name})
-    return renamed != (schema.precondition, schema.effect, schema.observe)
+    return renamed != (schema.precondition, schema.effect, schema.observe, schema.told)
 
 
-def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, object, object]:
-    """Precondition, effect and observation with other parameters."""
+def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, object, object, object]:
+    """Precondition, effect and observations with other parameters."""
     free, observed = dict(binding), schema.observe
     told: object = None
     if isinstance(observed, me.Choice):
         told = me.substitute(observed, free)
     elif observed is not None:
         told = mf.substitute(observed, free)
-    return mf.substitute(schema.precondition, free), me.substitute(schema.effect, free), told
+    besides = tuple(
+        replace(each, condition=mf.substitute(each.condition, free), when=mf.substitute(each.when, free))
+        for each in schema.told
+    )
+    return mf.substitute(schema.precondition, free), me.substitute(schema.effect, free), told, besides
 
 
 def _unused_templates(known: Known) -> Iterator[Diagnostic]:

@@ -28,7 +28,9 @@ GOAL_FLUENTS = frozenset({"goal-probability", "goal-achieved"})
 def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None) -> None:
     """Fill ``names`` with the declarations of both definitions."""
     names.hierarchy = _types(names, domain)
-    names.derived = frozenset(rule.head.predicate.key for rule in sections(domain, ast.Derived))
+    names.derived = frozenset(
+        head.predicate.key for rule in sections(domain, ast.Derived) for head in rule.heads
+    )
     for definition in (domain, problem) if problem is not None else (domain,):
         for section in sections(definition, ast.TypedSection):
             if section.kind != "types":
@@ -188,7 +190,8 @@ def _objects(names: Names, section: ast.TypedSection) -> None:
 
 def _predicates(names: Names, domain: ast.Definition) -> None:
     names.section = "predicates"
-    for section in sections(domain, ast.Predicates):
+    lists = (ast.Predicates, ast.Observables)
+    for section in (each for each in domain.sections if isinstance(each, lists)):
         for node in section.declarations:
             key = node.name.key
             if key == "=":

@@ -32,6 +32,8 @@ def schema_conditions(schema: md.Schema) -> Iterator[mf.Formula]:
         yield from me.conditions(schema.observe)
     elif schema.observe is not None:
         yield schema.observe
+    for reading in schema.told:
+        yield from (reading.condition, reading.when)
 
 
 def template_conditions(template: md.Template) -> Iterator[mf.Formula]:
@@ -50,7 +52,7 @@ def all_conditions(model: md.Model) -> Iterator[mf.Formula]:
         yield rule.condition
     for sensor in model.sensors:
         yield sensor.condition
-        yield sensor.sensed
+        yield md.facts_told(sensor.sensed)
     for template in model.templates.values():
         yield from template_conditions(template)
     yield from (clause.condition for clause in model.init.clauses)
@@ -60,11 +62,10 @@ def all_conditions(model: md.Model) -> Iterator[mf.Formula]:
 
 def observed(schema: md.Schema) -> set[str]:
     """Predicates that ``:observe`` makes known."""
-    if schema.observe is None:
-        return set()
-    if isinstance(schema.observe, me.Choice):
-        return {leaf.predicate for leaf in me.settings(schema.observe)}
-    return {atom.predicate for atom in mf.atoms(schema.observe)}
+    found = {atom.predicate for reading in schema.told for atom in mf.atoms(reading.condition)}
+    if schema.observe is not None:
+        found |= {atom.predicate for atom in mf.atoms(md.facts_told(schema.observe))}
+    return found
 
 
 @dataclass(slots=True)
@@ -132,6 +133,7 @@ def reached(model: md.Model) -> Reached:
         result.values[fact.predicate, fact.value] = None
         if fact.value is Truth.UNKNOWN and has_hidden_state(model):
             result.values.update({(fact.predicate, value): None for value in (Truth.TRUE, Truth.FALSE)})
+    result.values.update({(name, value): None for name in model.thresholds for value in Truth})
     for choice in model.init.choices:
         for leaf in me.settings(choice):
             result.values[leaf.predicate, leaf.value] = None
@@ -162,7 +164,7 @@ def _close(model: md.Model, result: Reached) -> None:
             for schema in model.schemas.values()
         ),
         *(
-            (_read_in([sensor.condition, sensor.sensed]), partial(_sense, sensor, result))
+            (_read_in([sensor.condition, md.facts_told(sensor.sensed)]), partial(_sense, sensor, result))
             for sensor in model.sensors
         ),
     ]
@@ -199,7 +201,7 @@ def _happen(schema: md.Schema, result: Reached) -> None:
 
 def _sense(sensor: md.Sensor, result: Reached) -> None:
     if result.possible(sensor.condition):
-        _tell({atom.predicate for atom in mf.atoms(sensor.sensed)}, result)
+        _tell({atom.predicate for atom in mf.atoms(md.facts_told(sensor.sensed))}, result)
 
 
 def _tell(predicates: set[str], result: Reached) -> None:
@@ -240,8 +242,10 @@ def relevant(model: md.Model) -> set[str]:
         is_action, name = node
         if is_action:
             return read(schema_conditions(model.schemas[name]) if name in model.schemas else ())
+        asked = model.thresholds.get(name)
         return chain(
             read(rule.condition for rule in rules.get(name, ())),
+            read(() if asked is None else (asked.condition,)),
             ((True, action) for action in setters.get(name, ())),
         )
 
@@ -253,9 +257,9 @@ def relevant(model: md.Model) -> set[str]:
         start += read(template_conditions(template))
         start += [(True, call.name) for call in md.calls(template.body) if call.kind == "action"]
     for sensor in model.sensors:
-        start += read([sensor.condition, sensor.sensed])
+        start += read([sensor.condition, md.facts_told(sensor.sensed)])
     for name, schema in model.schemas.items():
-        if schema.observe is not None or (model.metric == "reward" and me.earns(schema.effect)):
+        if schema.tells or (model.metric == "reward" and me.earns(schema.effect)):
             start.append((True, name))
     return {name for is_action, name in reachable(start, leads) if is_action}
 

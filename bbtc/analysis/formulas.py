@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 from math import lcm
 from typing import TYPE_CHECKING
@@ -11,6 +12,8 @@ from typing_extensions import assert_never
 from bbtc.analysis import truth_words
 from bbtc.analysis.names import Names, Scope, nearest
 from bbtc.diagnostics import Related
+from bbtc.kleene import Truth
+from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
@@ -22,6 +25,7 @@ from bbtc.syntax.words import TEST_WORDS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+HALF = Fraction(1, 2)
 ROUNDING = Fraction(1, 10**9)
 """Probabilities whose sum differs from 1 by at most this are taken as rounded: each is divided
 by the sum. A smaller sum gets a no-change branch, a larger one is an error."""
@@ -102,14 +106,62 @@ def formula(names: Names, node: ast.Formula, scope: Scope) -> mf.Formula:
         case ast.Quantified(kind, groups, part, span):
             parameters, inside = inner_scope(names, groups, scope)
             return mf.Quantified(kind, parameters, formula(names, part, inside), span)
+        case ast.Believed():
+            return believed(names, node, scope) or mf.ALWAYS
         case ast.Test(kind, tested, span):
-            found = atom(names, tested, scope)
+            found = (
+                atom(names, tested, scope) if isinstance(tested, ast.Atom) else believed(names, tested, scope)
+            )
             return mf.ALWAYS if found is None else mf.Test(kind, found, span)
         case ast.Unsupported():
             unsupported(names, node)
             return mf.ALWAYS
         case _:
             assert_never(node)
+
+
+def believed(names: Names, node: ast.Believed, scope: Scope) -> mf.Atom | None:
+    """A threshold on what is believed, as a fact that stands for it; None after an error."""
+    part = formula(names, node.part, scope)
+    value = node.at_least.value
+    if not HALF < value <= 1:
+        message = f"`believed` asks for a probability above 1/2, up to 1, not {node.at_least.text}"
+        hint = "that the contrary is as probable is asked as `(believed (not …) …)`"
+        names.report.error("BBT0420", message, node.at_least.span, percentage(value) or hint)
+        return None
+    if any(reading.value in (None, Truth.UNKNOWN) for reading in mf.readings(part)) or any(
+        read.predicate in names.thresholds for read in mf.atoms(part)
+    ):
+        message = "`believed` is about facts, not about what is known or believed"
+        names.report.error("BBT0420", message, node.part.span)
+        return None
+    free = [parameter for parameter in scope.values() if parameter.name in mf.free(part)]
+    args = tuple(parameter.name for parameter in free)
+    name = f"believed {_shape(part, args)} {value}"
+    threshold = md.Threshold(tuple(free), part, value, _called(part), node.span)
+    if names.thresholds.setdefault(name, threshold) is threshold:
+        parameters = tuple(replace(each, types=each.types) for each in free)
+        names.predicates[name] = md.Predicate(
+            name, parameters, declared_three_valued=True, span=node.span, inferred=True
+        )
+    return mf.Atom(name, args, node.span)
+
+
+def _shape(part: mf.Formula, args: Sequence[str]) -> str:
+    """The same for formulas that differ only in the names of their parameters."""
+    places = {arg: f"?{number}" for number, arg in enumerate(args, 1)}
+    return repr(mf.substitute(part, {**places}))
+
+
+def _called(part: mf.Formula) -> str:
+    """What a threshold on a formula is called."""
+    match part:
+        case mf.Atom(predicate):
+            return predicate
+        case mf.Not(mf.Atom(predicate)):
+            return f"not-{predicate}"
+        case _:
+            return "formula"
 
 
 # --- effects ---------------------------------------------------------------------------------
@@ -133,6 +185,7 @@ def effect(names: Names, node: ast.Effect, scope: Scope) -> me.Effect:
             return probabilistic(names, node, scope)
         case ast.OneOf(parts, span):
             if not parts:
+                nothing_to_choose(names, "oneof", span)
                 return me.NOTHING
             share = Fraction(1, len(parts))
             branches = tuple(me.Branch(share, effect(names, p, scope), p.span) for p in parts)
@@ -144,6 +197,12 @@ def effect(names: Names, node: ast.Effect, scope: Scope) -> me.Effect:
             return me.NOTHING
         case _:
             assert_never(node)
+
+
+def nothing_to_choose(names: Names, word: str, span: Span) -> None:
+    """Report a form of which one part holds, and that has none."""
+    hint = "leave it out; `(and)` says nothing, and changes nothing"
+    names.report.error("BBT0418", f"one part of `({word})` should hold, but there is none", span, hint)
 
 
 def _setting(names: Names, node: ast.Assign, scope: Scope) -> me.Effect:

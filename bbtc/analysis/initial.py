@@ -53,6 +53,8 @@ class _Reader:
                 self.choices.append(formulas.effect(names, element, {}))
             case ast.FluentValue(fluent, value):
                 self._number(fluent, value)
+            case ast.InitClause(ast.Or(()), span):
+                formulas.nothing_to_choose(names, "or", span)
             case ast.InitClause(formula, span):
                 self.clauses.append(md.InitialClause(formulas.formula(names, formula, {}), False, span))
             case ast.Invariant(parts, span):

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 
 from bbtc.analysis.undeclared import Uses, likely, slip, uses_of
 from bbtc.diagnostics import Related, Report
-from bbtc.model.domain import Function, Predicate
+from bbtc.model.domain import Function, Predicate, Threshold
 from bbtc.model.formula import Equal, Formula, Quantified, Term
 from bbtc.model.types import OBJECT, Object, Parameter, Type, TypeHierarchy
 from bbtc.source import Span
@@ -76,6 +76,8 @@ class Names:
     definitions: tuple[ast.Definition, ...] = ()
     derived: frozenset[str] = frozenset()
     """Keys of the predicates that have rules."""
+    thresholds: dict[str, Threshold] = field(default_factory=dict)
+    """What ``(believed …)`` asks, by the predicate that stands for it."""
     in_problem: bool = False
     """What is being read is the problem's."""
     lenient: bool = False

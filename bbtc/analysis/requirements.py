@@ -138,7 +138,8 @@ def _in_domain(model: md.Model) -> Iterator[_Use]:
         yield ":templates", template.span
         yield from _in_effect(template.effect or me.NOTHING)
     yield from ((":derived-predicates", rule.span) for rule in model.rules)
-    yield from ((":unknown", each.span) for each in model.predicates.values() if each.declared_three_valued)
+    declared = (each for each in model.predicates.values() if each.name not in model.thresholds)
+    yield from ((":unknown", each.span) for each in declared if each.declared_three_valued)
     for function in model.functions.values():
         yield ":rewards" if function.name == "reward" else ":action-costs", function.span
 
@@ -169,7 +170,8 @@ def _in_formula(formula: mf.Formula) -> Iterator[_Use]:
             for part in parts:
                 yield from _in_formula(part)
         case mf.Or(parts, span):
-            yield ":disjunctive-preconditions", span
+            if span is not None:  # written, and not what a form of another planner stands for
+                yield ":disjunctive-preconditions", span
             for number, part in enumerate(parts):
                 # The negation that stands first may be that of an `imply`.
                 yield from _in_formula(part.part if number == 0 and isinstance(part, mf.Not) else part)

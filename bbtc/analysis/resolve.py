@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 
-from bbtc.analysis import bodies, facts, formulas, truth_words
+from typing_extensions import assert_never
+
+from bbtc.analysis import bodies, facts, formulas, po_pddl, replanner, truth_words
 from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
@@ -19,11 +22,25 @@ from bbtc.model.types import Parameter
 from bbtc.source import Span
 from bbtc.syntax import ast
 
-_PROBLEM_ONLY = (ast.Init, ast.Goal, ast.GoalNumber, ast.Metric, ast.DomainReference, ast.Hidden)
+_PROBLEM_ONLY = (
+    ast.Init,
+    ast.InitBelief,
+    ast.Goal,
+    ast.GoalNumber,
+    ast.Metric,
+    ast.DomainReference,
+    ast.Hidden,
+)
 _LISTS = (ast.Requirements, ast.TypedSection, ast.Predicates, ast.Functions)
-_SEVERAL = (ast.Action, ast.Derived, ast.Sensor, ast.Template, ast.Hidden)
+_SEVERAL = (
+    *(ast.Action, ast.Derived, ast.Sensor, ast.Template, ast.Hidden),
+    *(ast.StateVariable, ast.AtomList, ast.ObservationModel),
+)
 """What a definition has several of; of everything else one section is enough."""
-_DOMAIN_ONLY = (ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template)
+_DOMAIN_ONLY = (
+    *(ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template),
+    *(ast.StateVariable, ast.AtomList, ast.DefaultSensing, ast.Observables, ast.ObservationModel),
+)
 
 
 def resolve(
@@ -40,13 +57,30 @@ def resolve(
     names = Names(report, definitions=definitions, lenient=lenient)
     _check_sections(report, domain, problem)
     declare(names, domain, problem)
+    variables = replanner.variables(names, domain)
+    sensing = next(sections(domain, ast.DefaultSensing), None)
+    told = po_pddl.of_domain(names, domain)
+    shared = {} if sensing is None else _default_sensing(names, sensing)
     schemas: dict[str, md.Schema] = {}
     for signature, action in zip(names.actions.values(), sections(domain, ast.Action), strict=True):
         names.section = f"action {signature.name}"
-        schemas[signature.name] = _schema(names, signature, action)
-    rules = tuple(_rule(names, node) for node in sections(domain, ast.Derived))
+        made = _schema(names, signature, action)
+        made = replace(made, effect=replanner.one_value(variables, made.effect))
+        if sensing is not None and action.observe is None:
+            made = replace(made, observe=replanner.told(shared, sensing.span), observe_span=sensing.span)
+        schemas[signature.name] = replace(made, told=(*made.told, *told))
+    rules = tuple(rule for node in sections(domain, ast.Derived) for rule in _rules(names, node))
+    if sensing is not None:
+        rules = (*rules, *replanner.derived(names, shared, sensing.span))
+    for sticky in replanner.sticky(names, domain):
+        rules = (*rules, sticky.rule)
+        for key, schema in schemas.items():
+            schemas[key] = replace(schema, effect=me.Together((schema.effect, sticky.effect)))
     _check_stratified(names, rules)
-    sensors = tuple(_sensor(names, node) for node in sections(domain, ast.Sensor))
+    sensors = (
+        *(_sensor(names, node) for node in sections(domain, ast.Sensor)),
+        *replanner.always_told(names, domain),
+    )
     templates: dict[str, md.Template] = {}
     for node in sections(domain, ast.Template):
         names.section = f"template {node.name.key}"
@@ -69,13 +103,19 @@ def resolve(
         init=md.Init(),
         goal=None,
         counts_cost=_counts_cost(names, schemas),
+        symbols=tuple(sorted(replanner.symbols(names, domain) | _observables(domain))),
         requirements=requirements,
         span=domain.name.span,
     )
     if problem is not None:
         model = _with_problem(names, model, domain, problem)
+        model = replace(model, init=replanner.completed(names, variables, model.init))
+    definitions = (domain,) if problem is None else (domain, problem)
+    model = replace(model, may_fail=po_pddl.is_po_pddl(*definitions))
     names.finish()
-    model = replace(model, types=names.hierarchy, predicates=_three_valued(model))
+    model = replace(
+        model, types=names.hierarchy, predicates=_three_valued(model), thresholds=names.thresholds
+    )
     return None if report.errors else model
 
 
@@ -130,12 +170,20 @@ def _scope(parameters: tuple[Parameter, ...]) -> dict[str, Parameter]:
 def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
     scope = _scope(signature.parameters)
     observe: mf.Formula | me.Choice | None = None
-    if node.observe is not None:
-        content = node.observe.content
-        if isinstance(content, ast.Probabilistic):
-            observe = formulas.probabilistic(names, content, scope)
-        else:
-            observe = formulas.formula(names, content, scope)
+    told: tuple[md.Reading, ...] = ()
+    match node.observe:
+        case ast.SensingModel(word="observation"):
+            told = po_pddl.of_action(names, node.observe, scope)
+        case ast.SensingModel(effect, span):
+            observe = replanner.told(replanner.sensing(names, effect, scope), span)
+        case ast.Observation():
+            observe = _observed(names, node.observe, scope)
+        case None:
+            pass
+        case _:
+            assert_never(node.observe)
+    if node.repeats:
+        _check_repeats(names, f"action `{signature.name}`", observe, node.name.span)
     return md.Schema(
         signature.name,
         signature.parameters,
@@ -143,8 +191,40 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
         me.NOTHING if node.effect is None else formulas.effect(names, node.effect, scope),
         observe,
         None if node.observe is None else node.observe.span,
+        node.repeats,
+        told,
         node.span,
     )
+
+
+def _observables(domain: ast.Definition) -> frozenset[str]:
+    return frozenset(
+        declared.name.key for node in sections(domain, ast.Observables) for declared in node.declarations
+    )
+
+
+def _observed(names: Names, node: ast.Observation, scope: dict[str, Parameter]) -> mf.Formula | me.Choice:
+    if isinstance(node.content, ast.Probabilistic):
+        return formulas.probabilistic(names, node.content, scope)
+    return formulas.formula(names, node.content, scope)
+
+
+def _check_repeats(names: Names, whose: str, observed: mf.Formula | me.Choice | None, span: Span) -> None:
+    if not isinstance(observed, me.Choice):
+        message = f"`:repeats` of {whose} says nothing: no reading of it may be wrong"
+        hint = "it is for noisy readings, written `(probabilistic q (p))`"
+        names.report.warning("BBT0419", message, span, hint)
+
+
+def _default_sensing(names: Names, node: ast.DefaultSensing) -> dict[tuple[str, tuple[str, ...]], mf.Formula]:
+    names.section = "default-sensing-model"
+    return replanner.sensing(names, node.effect, {})
+
+
+def _rules(names: Names, node: ast.Derived) -> Iterator[md.Rule]:
+    """The rules of a form, one for each atom that it derives."""
+    for head in node.heads:
+        yield _rule(names, replace(node, head=head, others=()))
 
 
 def _rule(names: Names, node: ast.Derived) -> md.Rule:
@@ -206,8 +286,10 @@ def _sensor(names: Names, node: ast.Sensor) -> md.Sensor:
     parameters = names.parameters(node.parameters)
     scope = _scope(parameters)
     condition = mf.ALWAYS if node.condition is None else formulas.formula(names, node.condition, scope)
-    sensed = formulas.formula(names, node.sensed, scope)
-    return md.Sensor(node.name.key, parameters, condition, sensed, node.span)
+    sensed = _observed(names, node.sensed, scope)
+    if node.repeats:
+        _check_repeats(names, f"sensor `{node.name.key}`", sensed, node.name.span)
+    return md.Sensor(node.name.key, parameters, condition, sensed, node.repeats, node.span)
 
 
 def _counts_cost(names: Names, schemas: dict[str, md.Schema]) -> bool:
@@ -256,6 +338,9 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
             )
     names.section, names.in_problem = "init", True
     init = initial(names, list(sections(problem, ast.Init)))
+    beliefs = list(sections(problem, ast.InitBelief))
+    if beliefs:
+        init = po_pddl.believed(names, beliefs, init)
     for hidden in sections(problem, ast.Hidden):
         for fact in hidden.facts:
             assigned = truth_words.assigned(names, fact)

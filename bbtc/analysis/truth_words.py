@@ -24,7 +24,8 @@ def tested(names: Names, node: ast.Atom) -> ast.Test | None:
     if not isinstance(argument, ast.Name):
         return None
     kind: Literal["known", "unknown"] = "known" if key == "known" else "unknown"
-    test = ast.Test(kind, ast.Atom(argument, (), argument.span), node.span)
+    atom = ast.Atom(argument, (), argument.span)
+    test = ast.Test(kind, atom, node.span)
     declared = names.predicates.get(key)
     if declared is None or len(declared.parameters) != 1:
         return test
@@ -47,6 +48,7 @@ def assigned(names: Names, node: ast.Assign) -> ast.Assign | None:
     test = tested(names, node.atom)
     if test is None:
         return node
+    assert isinstance(test.atom, ast.Atom)  # the argument
     if test.kind == "unknown" and node.value is Truth.TRUE:
         return ast.Assign(test.atom, Truth.UNKNOWN, node.span)
     names.report.error(

@@ -16,6 +16,7 @@ from bbtc.tree.nodes import Tree
 if TYPE_CHECKING:
     from bbtc.belief.scenarios import Sampling, Scenario
     from bbtc.belief.simulate import Figures
+    from bbtc.belief.worst_world import WorstWorld
     from bbtc.planner.failing_runs import FailingRun
 
 
@@ -50,6 +51,7 @@ def figures_to_json(
         "reward": _figure(figures.reward),
         "states": figures.states,
         **({"mistaken": figure_text(figures.mistaken)} if figures.mistaken else {}),
+        **({"worst_world": _worst_world(figures.worst)} if figures.worst is not None else {}),
         "scenarios": [
             {
                 "p": figure_text(run.probability),
@@ -75,6 +77,11 @@ def figures_to_json(
             "cut": sampling.cut,
         }
     return data
+
+
+def _worst_world(worst: WorstWorld) -> dict[str, Any]:
+    facts = {fact: Truth.of(fact in worst.true).word for fact in worst.facts}
+    return {"success": figure_text(worst.success), "facts": facts}
 
 
 def values_to_json(tree: Tree, values: Values) -> dict[str, str]:

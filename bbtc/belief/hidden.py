@@ -225,6 +225,21 @@ def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
     return sum((p for world, p in worlds.items() if evaluate(condition, world) is Truth.TRUE), ZERO)
 
 
+def true_in_worlds(task: Task, condition: Condition, values: Values, worlds: Mapping[int, int]) -> bool:
+    """Is a condition on what is known really so in a state, in these worlds, by component? As in
+    :func:`chance_of`."""
+    told = {
+        leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if is_test(leaf)
+    }
+    real = bytearray(values)
+    for index, world in worlds.items():
+        component = task.components[index]
+        local = local_values(component, world)
+        for each in component.known:
+            real[each.variable] = compile_condition(each.condition)(local)
+    return evaluate(replaced(condition, lambda leaf: told.get(leaf, leaf)), bytes(real)) is Truth.TRUE
+
+
 def _drawn(task: Task, values: Values, index: int, known: Sequence[Knowledge]) -> dict[Delta, Fraction]:
     """The values that some conditions have in the world, and how probable they are."""
     component = task.components[index]

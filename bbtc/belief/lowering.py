@@ -57,7 +57,7 @@ def lowered(task: Task, limits: Limits) -> Task:
         for number, lowering in found.items()
         if len(task.components[number].facts) == 1 and len(task.components[number].known) == 1
     }
-    lower = _without(task, found)
+    lower = replace(_without(task, found), unlowered=task)
     return lower if len(alone) == len(found) else replace(lower, origin=_without(task, alone))
 
 

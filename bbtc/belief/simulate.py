@@ -9,6 +9,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.failures import FailureFinder
 from bbtc.belief.tick import NodeStatus, compile_tick
+from bbtc.belief.worst_world import WorstWorld
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import ONE, ZERO, Task
 from bbtc.limits import Limits
@@ -36,7 +37,8 @@ class Figures:
     """What a tree does, exactly. The probabilities of success, failure, blocked, endless and mistaken (the
     root succeeds, but the goal is not true: what is hidden was taken for true) sum to 1. Costs and numbers of
     actions are expectations; None is infinite, or, given success, undefined because success is
-    impossible."""
+    impossible. ``worst`` is the worst world that hidden facts may make at the start; None where nothing is
+    hidden, or that was not worked out."""
 
     success: Fraction
     failure: Fraction
@@ -50,6 +52,7 @@ class Figures:
     reward: Fraction | None
     states: int
     mistaken: Fraction = Fraction(0)
+    worst: WorstWorld | None = None
 
 
 def simulate(task: Task, root: Node, limits: Limits) -> Figures:

@@ -82,13 +82,16 @@ def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transiti
     def results(values: Values) -> tuple[Result, ...]:
         known = cache.get(values)
         if known is None:
-            known = cache[values] = _results(values, action.cost, product_of(values, drawers, bounded.spend))
+            known = cache[values] = results_of(
+                values, action.cost, product_of(values, drawers, bounded.spend)
+            )
         return known
 
     return results
 
 
-def _results(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> tuple[Result, ...]:
+def results_of(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> tuple[Result, ...]:
+    """Draws as results, equal ones merged, the most probable first (ties by values)."""
     merged: dict[tuple[Values, Fraction, Fraction], Fraction] = {}
     for (delta, extra, reward), probability in draws.items():
         if not probability:

@@ -20,6 +20,7 @@ from bbtc.tree.nodes import Tree, retries_of, walk
 if TYPE_CHECKING:
     from bbtc.belief.scenarios import Scenario
     from bbtc.belief.simulate import Figures
+    from bbtc.belief.worst_world import WorstWorld
     from bbtc.planner.failing_runs import FailingRun
     from bbtc.planner.result import Plan, Refinement
     from bbtc.planner.why_not import Block
@@ -70,6 +71,14 @@ def simplified_line(last: Refinement, tree: Tree) -> list[str]:
     ]
 
 
+def worst_world_line(figures: Figures) -> list[str]:
+    """What a tree attains in the worst world, where that is less than in the mean."""
+    worst = figures.worst
+    if worst is None or worst.success == figures.success:
+        return []
+    return [f"success probability {exact(worst.success)} {worst_world(worst)}, the worst world"]
+
+
 def plan_summary(plan: Plan, max_actions: int | None = None) -> list[str]:
     """How planning ended, in words; ``max_actions``: within that many actions."""
     tree = plan.tree
@@ -107,6 +116,26 @@ def _has_oneof(factor: Factor) -> bool:
     return factor.oneof or any(_has_oneof(inner) for each in factor.outcomes for inner in each.factors)
 
 
+def rerolled_note(actions: Sequence[str]) -> list[str]:
+    """That figures rest on noisy readings that are made again; nothing where there are none."""
+    if not actions:
+        return []
+    more = f" and {len(actions) - _MOST_NAMED} more" if len(actions) > _MOST_NAMED else ""
+    listed = printable(", ".join(actions[:_MOST_NAMED]))
+    return [f"of {listed}{more} are made again, and count as drawn anew (see :repeats)"]
+
+
+def worst_world(worst: WorstWorld) -> str:
+    """Which world is the worst, in words."""
+    listed = [fact for fact in worst.facts if fact in worst.true]
+    if len(worst.facts) == 1 and not listed:
+        return f"where {printable(worst.facts[0])} is false at the start"
+    more = f" and {len(listed) - _MOST_NAMED} more" if len(listed) > _MOST_NAMED else ""
+    others = "" if len(listed) == len(worst.facts) else ", and no other hidden fact,"
+    shown = f"{printable(', '.join(listed[:_MOST_NAMED]))}{more}{others}" if listed else "no hidden fact"
+    return f"where {shown} {'is' if len(listed) < 2 else 'are'} true at the start"
+
+
 def figures_report(tree: Tree, figures: Figures) -> list[str]:
     """The figures of a tree as lines of text."""
     lines = [f"success   {exact(figures.success)}", f"failure   {exact(figures.failure)}"]
@@ -116,6 +145,10 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
         lines.append(f"blocked   {exact(figures.blocked)}")
     if figures.endless:
         lines.append(f"endless   {exact(figures.endless)}")
+    if figures.worst is not None and figures.worst.success < 1:
+        alike = figures.worst.success == figures.success
+        where = "in every world" if alike else worst_world(figures.worst)
+        lines.append(f"worst     {exact(figures.worst.success)} {where}")
     for share in figures.failures:
         what = stopped(tree, share.node, share.condition, share.status)
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")

@@ -27,7 +27,7 @@ from typing_extensions import assert_never
 from bbtc.diagnostics import Report
 from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
-from bbtc.ground.normal import Block, Chance, free, groups, reads
+from bbtc.ground.normal import Block, Chance, groups, reads
 from bbtc.ground.reachability.atoms import Atoms, Scope
 from bbtc.ground.reachability.bulk import Shared
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
@@ -139,8 +139,8 @@ class _Loop:
 
 def _ready(pending: list[mf.Formula], later: set[str]) -> list[mf.Formula]:
     """The parts that can be looked at before what comes later is bound; they are pending no more."""
-    ready = [part for part in pending if later.isdisjoint(free(part))]
-    pending[:] = [part for part in pending if not later.isdisjoint(free(part))]
+    ready = [part for part in pending if later.isdisjoint(mf.free(part))]
+    pending[:] = [part for part in pending if not later.isdisjoint(mf.free(part))]
     return ready
 
 

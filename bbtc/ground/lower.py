@@ -23,7 +23,7 @@ from bbtc.ground.condition import (
     doubt,
     negation,
 )
-from bbtc.ground.normal import conjuncts, disjuncts, free, normal_form
+from bbtc.ground.normal import conjuncts, disjuncts, normal_form
 from bbtc.ground.reachability.atoms import Atoms, Leaves, OpenLeaves, Scope
 from bbtc.ground.reachability.bulk import Shared, instances, picker
 from bbtc.ground.universe import Row, Universe
@@ -120,14 +120,14 @@ class Lowering:
         it can never be true in the model."""
         parts = sorted(conjuncts(normal_form(formula)), key=self._late)
         parts = [part for part in parts if not self._settled(part, Scope.WORLD)]
-        names = (name for part in parts for name in free(part))
+        names = (name for part in parts for name in mf.free(part))
         used, frame = projection(self.universe, parameters, names)
         read = tuple(parameters[slot] for slot in used)
         return Shared(used, len(parameters), _Conjunction(self, parts, read, frame).all)
 
     def lowered(self, part: mf.Formula, parameters: tuple[Parameter, ...]) -> Shared[Condition]:
         """:meth:`normal` for many argument rows; false where it can never be true in the model."""
-        used, frame = projection(self.universe, parameters, free(part))
+        used, frame = projection(self.universe, parameters, mf.free(part))
         condition, can_be_true = self.normal(part, frame, Scope.WORLD), self.atoms.can_be_true
 
         def make(rows: list[Row]) -> list[Condition]:

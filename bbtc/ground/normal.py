@@ -129,7 +129,7 @@ def reads(block: Block) -> Iterator[str]:
     """The terms of a block, repeats and those that it binds itself included."""
     for item in block.items:
         for part in item.guard:
-            yield from free(part)
+            yield from mf.free(part)
         match item.leaf:
             case me.Set(_, args):
                 yield from args
@@ -139,7 +139,7 @@ def reads(block: Block) -> Iterator[str]:
                 assert_never(item.leaf)
     for chance in block.chances:
         for part in chance.guard:
-            yield from free(part)
+            yield from mf.free(part)
         for _, branch in chance.branches:
             yield from reads(branch)
 
@@ -186,8 +186,8 @@ def normal_form(formula: mf.Formula, negative: bool = False) -> mf.Formula:
 def _bind(kind: Literal["exists", "forall"], parameter: Parameter, part: mf.Formula) -> mf.Formula:
     join = mf.And if kind == "exists" else mf.Or  # 12
     parts = list(_flat(join, part))
-    outside = [each for each in parts if parameter.name not in free(each)]
-    inside = [each for each in parts if parameter.name in free(each)]
+    outside = [each for each in parts if parameter.name not in mf.free(each)]
+    inside = [each for each in parts if parameter.name in mf.free(each)]
     bound = mf.Quantified(kind, (parameter,), inside[0] if len(inside) == 1 else join(tuple(inside)))
     return join((*outside, bound)) if outside else bound
 
@@ -208,31 +208,3 @@ def conjuncts(formula: mf.Formula) -> Iterator[mf.Formula]:
 def disjuncts(formula: mf.Formula) -> Iterator[mf.Formula]:
     """The parts of nested disjunctions, from left to right."""
     return _flat(mf.Or, formula)
-
-
-def free(formula: mf.Formula) -> dict[str, None]:
-    """Free parameters, in order of appearance."""
-    found: dict[str, None] = {}
-    _free(formula, frozenset(), found)
-    return found
-
-
-def _free(formula: mf.Formula, bound: frozenset[str], found: dict[str, None]) -> None:
-    match formula:
-        case mf.Atom(_, args) | mf.Test(_, mf.Atom(_, args)):
-            terms = args
-        case mf.Equal(left, right):
-            terms = (left, right)
-        case mf.Not(part):
-            _free(part, bound, found)
-            return
-        case mf.And(parts) | mf.Or(parts):
-            for part in parts:
-                _free(part, bound, found)
-            return
-        case mf.Quantified(_, parameters, part):
-            _free(part, bound | {p.name for p in parameters}, found)
-            return
-        case _:
-            assert_never(formula)
-    found.update((term, None) for term in terms if mf.is_parameter(term) and term not in bound)

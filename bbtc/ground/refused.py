@@ -10,8 +10,11 @@ from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.hidden import has_hidden_state
 
 _START = "facts, `(unknown …)`, `(probabilistic …)`, `(oneof …)` and `(or …)` can"
+
+_NOISY = "a noisy reading is written `(probabilistic q (p))`: right with q, whichever the truth"
 
 _FACTS = "the robot knows what it knows: `(unknown …)` and `(known …)` belong into conditions"
 
@@ -24,23 +27,34 @@ def refused(model: md.Model) -> Iterator[Diagnostic]:
                 "BBT0406",
                 f"`:observe` of action `{schema.name}` cannot be grounded",
                 schema.observe_span,
-                "a noisy reading is written `(probabilistic q (p))`: right with q, whichever the truth",
+                _NOISY,
             )
         elif (
             schema.observe is not None
             and not isinstance(schema.observe, me.Choice)
-            and any(map(_is_test, mf.readings(schema.observe)))
+            and any(_is_knowledge(model, reading) for reading in mf.readings(schema.observe))
         ):
             message = f"`:observe` of action `{schema.name}` tells of facts, not of what is known"
             yield Diagnostic("BBT0406", message, schema.observe_span, _FACTS)
+        for told in (part for reading in schema.told for part in (reading.condition, reading.when)):
+            if any(_is_knowledge(model, reading) for reading in mf.readings(told)):
+                message = f"`:observation` of action `{schema.name}` tells of facts, not of what is known"
+                yield Diagnostic("BBT0406", message, schema.span, _FACTS)
     for sensor in model.sensors:
-        if any(map(_is_test, mf.readings(sensor.sensed))):
+        if isinstance(sensor.sensed, me.Choice) and noise(sensor.sensed) is None:
+            message = f"what sensor `{sensor.name}` tells cannot be grounded"
+            yield Diagnostic("BBT0407", message, sensor.span, _NOISY)
+        if any(_is_knowledge(model, each) for each in mf.readings(md.facts_told(sensor.sensed))):
             message = f"sensor `{sensor.name}` tells of facts, not of what is known"
             yield Diagnostic("BBT0407", message, sensor.span, _FACTS)
     for clause in model.init.clauses:
         if any(_is_no_fact(model, reading) for reading in mf.readings(clause.condition)):
             message = "a condition in `:init` tells of facts, not of what is known or derived"
             yield Diagnostic("BBT0405", message, clause.span, _START)
+    for threshold in () if has_hidden_state(model) else model.thresholds.values():
+        message = "nothing is hidden here that `believed` could ask about"
+        hint = "hidden is what `:observe` tells, and what `:init` leaves open beside it"
+        yield Diagnostic("BBT0420", message, threshold.span, hint)
     if model.problem is not None and model.goal is None:
         yield Diagnostic(
             "BBT0411",
@@ -59,6 +73,8 @@ def noise(observed: me.Choice) -> tuple[me.Set, Fraction] | None:
 
 
 def _is_no_fact(model: md.Model, reading: mf.Reading) -> bool:
+    if reading.atom.predicate in model.thresholds:
+        return True
     return _is_test(reading) or model.predicates[reading.atom.predicate].derived
 
 
@@ -66,6 +82,10 @@ def _observed(schema: md.Schema) -> Iterator[mf.Reading]:
     """The facts that an action tells exactly."""
     if schema.observe is not None and not isinstance(schema.observe, me.Choice):
         yield from mf.readings(schema.observe)
+
+
+def _is_knowledge(model: md.Model, reading: mf.Reading) -> bool:
+    return _is_test(reading) or reading.atom.predicate in model.thresholds
 
 
 def _is_test(reading: mf.Reading) -> bool:

@@ -12,7 +12,7 @@ from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
 from bbtc.kleene import Truth
-from bbtc.limits import Limits
+from bbtc.limits import MOST_WORLDS, Limits
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
@@ -23,9 +23,6 @@ from bbtc.source import Span
 
 Key = tuple[str, tuple[str, ...]]
 World = dict[Key, Truth]
-
-MOST_WORLDS = 4096
-"""So many worlds a component of hidden facts may have, and a draw so many results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +115,10 @@ def _prior(model: md.Model, facts: World, report: Report, limits: Limits) -> Pri
     atoms = [key for key, value in facts.items() if value is Truth.UNKNOWN]
     atoms += [key for draw in draws for key in draw.atoms]
     atoms += [(atom.predicate, atom.args) for clause in clauses for atom in mf.atoms(clause.condition)]
+    for name, threshold in model.thresholds.items():
+        for count, binding in enumerate(_bindings(model, threshold.parameters)):
+            limits.check_bindings(count)
+            atoms.append((name, tuple(binding.values())))
     return Prior(tuple(draws), clauses, tuple(dict.fromkeys(key for key in atoms if key not in fixed)))
 
 

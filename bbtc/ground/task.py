@@ -101,6 +101,9 @@ class Factor:
     oneof: bool = False
 
 
+MISREAD = "misread "
+"""What begins the predicate of a fact that a reading which stays is wrong; no file can name it."""
+
 # --- what is hidden --------------------------------------------------------------------------
 
 
@@ -287,6 +290,9 @@ class Task:
     origin: Task | None = None
     """The task with hidden facts that this was made of, over the same variables, if a robot would have to
     work out what it knows: its readings stand there."""
+    unlowered: Task | None = field(default=None, compare=False, repr=False)
+    """The task with all hidden facts that this was made of, over the same variables, as long as it is at
+    hand: artefacts do not hold it."""
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property

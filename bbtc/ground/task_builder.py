@@ -72,6 +72,7 @@ def _signatures(model: md.Model) -> tuple[gt.Signature, ...]:
     predicates = [
         gt.Signature("predicate", predicate.name, tuple(p.name[1:] for p in predicate.parameters))
         for predicate in model.predicates.values()
+        if predicate.name not in model.thresholds
     ]
     return tuple(sorted([*actions, *predicates], key=lambda each: (each.kind, each.symbol)))
 

@@ -14,7 +14,7 @@ from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
 from bbtc.model.effect import Choice, Effect, Set, leaves
-from bbtc.model.formula import Formula, Term
+from bbtc.model.formula import And, Atom, Formula, Term
 from bbtc.model.types import Object, Parameter, TypeHierarchy
 from bbtc.source import Span
 
@@ -47,7 +47,8 @@ class Function:
 
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """An action. ``observe`` is what ``:observe`` shows: a condition, or a noisy draw."""
+    """An action. ``observe`` is what ``:observe`` shows: a condition, or a noisy draw; where that
+    ``repeats``, it is drawn anew only when a fact that it reads changes."""
 
     name: str
     parameters: tuple[Parameter, ...]
@@ -55,18 +56,45 @@ class Schema:
     effect: Effect
     observe: Formula | Choice | None = None
     observe_span: Span | None = field(default=None, compare=False, repr=False)
+    repeats: bool = False
+    told: tuple[Reading, ...] = ()
+    """What is told besides."""
     span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def tells(self) -> bool:
+        """Is anything told?"""
+        return self.observe is not None or bool(self.told)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Where ``when`` holds after an action, it is told whether ``condition`` is true, rightly with the
+    probability ``accuracy``."""
+
+    condition: Formula
+    accuracy: Fraction
+    when: Formula
 
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What becomes known by itself whenever the condition holds."""
+    """What becomes known by itself whenever the condition holds, as :attr:`Schema.observe` is."""
 
     name: str
     parameters: tuple[Parameter, ...]
     condition: Formula
-    sensed: Formula
+    sensed: Formula | Choice
+    repeats: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+
+
+def facts_told(observed: Formula | Choice) -> Formula:
+    """What an observation tells of, as a condition; of a noisy one, the facts."""
+    if isinstance(observed, Choice):
+        sets = (leaf for leaf in leaves(observed) if isinstance(leaf, Set))
+        return And(tuple(Atom(leaf.predicate, leaf.args, leaf.span) for leaf in sets))
+    return observed
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +163,19 @@ class Template:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """``(believed condition at_least)``: a fact for each binding of the parameters is true where the
+    condition has this probability, given what was told, false where its contrary has, and else unknown.
+    ``called`` is what its name tells of the condition."""
+
+    parameters: tuple[Parameter, ...]
+    condition: Formula
+    at_least: Fraction
+    called: str
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
 # --- the problem -----------------------------------------------------------------------------
 
 
@@ -193,6 +234,12 @@ class Model:
     goal_reward: Fraction = Fraction(0)
     metric: Literal["cost", "reward"] = "cost"
     counts_cost: bool = False
+    thresholds: Mapping[str, Threshold] = field(default_factory=dict)
+    """By the predicate that stands for each."""
+    may_fail: bool = False
+    """Preconditions on what is hidden are about the world: where they are false, actions change nothing."""
+    symbols: tuple[str, ...] = ()
+    """Predicates that stand for what is told, and for nothing else."""
     requirements: Mapping[str, Span] = field(default_factory=dict)
     goal_span: Span | None = field(default=None, compare=False, repr=False)
     span: Span | None = field(default=None, compare=False, repr=False)

@@ -153,3 +153,31 @@ def substitute(formula: Formula, binding: dict[str, Term]) -> Formula:
             return Quantified(kind, parameters, substitute(part, binding), span)
         case _:
             assert_never(formula)
+
+
+def free(formula: Formula) -> dict[str, None]:
+    """Free parameters, in order of appearance."""
+    found: dict[str, None] = {}
+    _free(formula, frozenset(), found)
+    return found
+
+
+def _free(formula: Formula, bound: frozenset[str], found: dict[str, None]) -> None:
+    match formula:
+        case Atom(_, args) | Test(_, Atom(_, args)):
+            terms = args
+        case Equal(left, right):
+            terms = (left, right)
+        case Not(part):
+            _free(part, bound, found)
+            return
+        case And(parts) | Or(parts):
+            for part in parts:
+                _free(part, bound, found)
+            return
+        case Quantified(_, parameters, part):
+            _free(part, bound | {p.name for p in parameters}, found)
+            return
+        case _:
+            assert_never(formula)
+    found.update((term, None) for term in terms if is_parameter(term) and term not in bound)

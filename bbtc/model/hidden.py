@@ -13,7 +13,7 @@ def has_hidden_state(model: md.Model) -> bool:
     return (
         bool(model.sensors or model.init.clauses)
         or any(predicate.observed for predicate in model.predicates.values())
-        or any(schema.observe is not None for schema in model.schemas.values())
+        or any(schema.tells for schema in model.schemas.values())
         or any(map(has_oneof, model.init.choices))
     )
 

@@ -51,10 +51,10 @@ def task_value(
     reached. Limits make the bounds wider, up to 0 and 1."""
     from bbtc.planner.mdp.solve import best_within
 
-    if task.components and options.allow_guess:
-        from bbtc.planner.stopping import Stopping
+    if task.components:
+        from bbtc.planner.stopping import stopping_of
 
-        stopping = Stopping.of(task, anywhere=True)
+        stopping = stopping_of(task, options)
         task = task if stopping is None else stopping.task
     steps = options.max_actions
     try:

@@ -45,7 +45,8 @@ Progress: TypeAlias = Callable[[Refinement], None]
 @dataclass(frozen=True, slots=True)
 class Plan:
     """A planner's answer. ``initial_success`` is the probability before any refinement; ``stop``
-    says which limit ended the search, if one did. ``chain`` is that of the tree, where it is at hand."""
+    says which limit ended the search, if one did. ``rerolled`` names actions whose noisy readings the tree
+    makes again, as if errors did not stay. ``chain`` is that of the tree, where it is at hand."""
 
     tree: Tree
     figures: Figures
@@ -53,6 +54,7 @@ class Plan:
     refinements: tuple[Refinement, ...]
     stop: Diagnostic | None = None
     chain: Chain | None = field(default=None, compare=False, repr=False)
+    rerolled: tuple[str, ...] = ()
 
     def _repr_svg_(self) -> str | None:
         """The picture of the tree, for notebooks."""

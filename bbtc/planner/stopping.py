@@ -43,6 +43,7 @@ from bbtc.ground.task import (
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.rewrite.simplify import numbered, simplified
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
@@ -144,6 +145,14 @@ class Stopping:
             return replace(each, variable=number[each.variable])
 
         return replaced(condition, leaf)
+
+
+def stopping_of(task: Task, options: Options) -> Stopping | None:
+    """How to stop at the goal of a task, if it may be stopped at without being known. Raises as
+    :meth:`Stopping.of` does."""
+    if task.components and (options.allow_guess or doubtful_goal(task)):
+        return Stopping.of(task, anywhere=options.allow_guess)
+    return None
 
 
 def known_goal(task: Task) -> Condition:

@@ -8,119 +8,25 @@ equal tree. Sections stand in source order.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from fractions import Fraction
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
-
-
-def _span() -> Span:
-    """The span field: neither compared nor shown."""
-    return field(compare=False, repr=False)  # type: ignore[no-any-return]
-
-
-# --- names, numbers, terms -------------------------------------------------------------------
-
-
-class _Placed:
-    """A word that knows where it starts, and makes its span when asked: a large file has a million
-    words, and nearly nobody asks. Nodes made with a span keep that."""
-
-    __slots__ = ("_source", "_start")
-    _source: SourceFile
-    _start: int
-    text: str
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Span:
-            if name != "span":
-                raise AttributeError(name)
-            return Span(self._source, self._start, self._start + len(self.text))
-
-
-@dataclass(frozen=True, slots=True)
-class Name(_Placed):
-    """A symbol as written."""
-
-    text: str
-    span: Span = _span()
-
-    @property
-    def key(self) -> str:
-        """The symbol as compared: lower case."""
-        return self.text.lower()
-
-
-@dataclass(frozen=True, slots=True)
-class Variable(_Placed):
-    """A parameter, question mark included."""
-
-    text: str
-    span: Span = _span()
-
-    @property
-    def key(self) -> str:
-        """The parameter as compared: lower case."""
-        return self.text.lower()
-
-
-@dataclass(frozen=True, slots=True)
-class Number:
-    """A number as written: ``0.5``, ``.5``, ``1/3``, ``7``, ``-2``, ``1e-3``."""
-
-    text: str
-    span: Span = _span()
-
-    @property
-    def value(self) -> Fraction:
-        """Exact value. Raises ``ZeroDivisionError`` for a zero denominator."""
-        return Fraction(self.text)
-
-
-Term: TypeAlias = Name | Variable
-
-
-@dataclass(frozen=True, slots=True)
-class TypedGroup:
-    """``a b - t``: names that share a type. ``types`` is empty without ``-``, and has several
-    names for ``(either t1 t2)``."""
-
-    names: tuple[Term, ...]
-    types: tuple[Name, ...]
-    span: Span = _span()
-
-
-TypedList: TypeAlias = tuple[TypedGroup, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Atom:
-    """``(predicate term…)``, or a bare ``predicate``."""
-
-    predicate: Name
-    args: tuple[Term, ...]
-    span: Span = _span()
-
+from bbtc.syntax.terms import Arithmetic as Arithmetic
+from bbtc.syntax.terms import Atom as Atom
+from bbtc.syntax.terms import Empty as Empty
+from bbtc.syntax.terms import Equality as Equality
+from bbtc.syntax.terms import FluentRef as FluentRef
+from bbtc.syntax.terms import Name as Name
+from bbtc.syntax.terms import Number as Number
+from bbtc.syntax.terms import NumericExpression as NumericExpression
+from bbtc.syntax.terms import Term as Term
+from bbtc.syntax.terms import TypedGroup as TypedGroup
+from bbtc.syntax.terms import TypedList as TypedList
+from bbtc.syntax.terms import Variable as Variable
+from bbtc.syntax.terms import span_field
 
 # --- formulas --------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Empty:
-    """``()``: the formula that always holds; as an effect, no change."""
-
-    span: Span = _span()
-
-
-@dataclass(frozen=True, slots=True)
-class Equality:
-    """``(= a b)`` over terms."""
-
-    left: Term
-    right: Term
-    span: Span = _span()
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +34,7 @@ class Not:
     """``(not f)``."""
 
     part: Formula
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +42,7 @@ class And:
     """``(and f…)``."""
 
     parts: tuple[Formula, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +50,7 @@ class Or:
     """``(or f…)``."""
 
     parts: tuple[Formula, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +59,7 @@ class Imply:
 
     premise: Formula
     conclusion: Formula
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,16 +69,25 @@ class Quantified:
     kind: Literal["exists", "forall"]
     parameters: TypedList
     part: Formula
-    span: Span = _span()
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class Believed:
+    """``(believed f q)``: how probable a formula is, given what was told, is at least a number."""
+
+    part: Formula
+    at_least: Number
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
 class Test:
-    """``(unknown p)`` and ``(known p)``: two-valued tests of an atom."""
+    """``(unknown p)`` and ``(known p)``: two-valued tests of an atom, or of what is believed."""
 
     kind: Literal["unknown", "known"]
-    atom: Atom
-    span: Span = _span()
+    atom: Atom | Believed
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,10 +96,12 @@ class Unsupported:
 
     construct: str
     text: str
-    span: Span = _span()
+    span: Span = span_field()
 
 
-Formula: TypeAlias = Atom | Empty | Equality | Not | And | Or | Imply | Quantified | Test | Unsupported
+Formula: TypeAlias = (
+    Atom | Empty | Equality | Not | And | Or | Imply | Quantified | Believed | Test | Unsupported
+)
 
 
 # --- effects ---------------------------------------------------------------------------------
@@ -196,7 +113,7 @@ class Assign:
 
     atom: Atom
     value: Truth
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +121,7 @@ class EffectAnd:
     """``(and e…)``."""
 
     parts: tuple[Effect, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +130,7 @@ class When:
 
     condition: Formula
     effect: Effect
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +139,7 @@ class EffectForall:
 
     parameters: TypedList
     effect: Effect
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +148,7 @@ class Branch:
 
     probability: Number
     effect: Effect
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +156,7 @@ class Probabilistic:
     """``(probabilistic p1 e1 …)``."""
 
     branches: tuple[Branch, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,28 +164,7 @@ class OneOf:
     """``(oneof e…)``."""
 
     parts: tuple[Effect, ...]
-    span: Span = _span()
-
-
-@dataclass(frozen=True, slots=True)
-class FluentRef:
-    """``(total-cost)``, ``reward``, ``(distance ?a ?b)``: a numeric fluent."""
-
-    name: Name
-    args: tuple[Term, ...]
-    span: Span = _span()
-
-
-@dataclass(frozen=True, slots=True)
-class Arithmetic:
-    """``(+ a b)``, ``(* 2 (f))``, ``(- x)``."""
-
-    operator: str
-    operands: tuple[NumericExpression, ...]
-    span: Span = _span()
-
-
-NumericExpression: TypeAlias = Number | FluentRef | Arithmetic
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +174,7 @@ class FluentEffect:
     operator: str
     fluent: FluentRef
     amount: NumericExpression
-    span: Span = _span()
+    span: Span = span_field()
 
 
 Effect: TypeAlias = (
@@ -295,7 +191,7 @@ class BodyControl:
 
     kind: Literal["sequence", "fallback", "skipper"]
     children: tuple[Body, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,7 +199,7 @@ class BodyCondition:
     """``(condition formula)``."""
 
     formula: Formula
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,7 +209,7 @@ class BodyCall:
     kind: Literal["action"] | None
     name: Name
     args: tuple[Term, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,7 +218,7 @@ class BodyForeach:
 
     parameters: TypedList
     child: Body
-    span: Span = _span()
+    span: Span = span_field()
 
 
 Body: TypeAlias = BodyControl | BodyCondition | BodyCall | BodyForeach
@@ -336,7 +232,7 @@ class Requirements:
     """``(:requirements :key…)``."""
 
     keys: tuple[Name, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,7 +241,7 @@ class TypedSection:
 
     kind: Literal["types", "constants", "objects"]
     entries: TypedList
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,7 +253,7 @@ class PredicateDeclaration:
     name: Name
     parameters: TypedList
     three_valued: bool
-    span: Span = _span()
+    span: Span = span_field()
     external: bool = False
     observed: bool = False
 
@@ -367,7 +263,7 @@ class Predicates:
     """``(:predicates …)``."""
 
     declarations: tuple[PredicateDeclaration, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -377,7 +273,7 @@ class FunctionDeclaration:
     name: Name
     parameters: TypedList
     types: tuple[Name, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,39 +281,109 @@ class Functions:
     """``(:functions …)``."""
 
     declarations: tuple[FunctionDeclaration, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """``(:action name :parameters … :precondition … :observe … :effect …)``."""
+    """``(:action name :parameters … :precondition … :observe … :repeats :effect …)``."""
 
     name: Name
     parameters: TypedList
     precondition: Formula | None
-    observe: Observation | None
+    observe: Observation | SensingModel | None
     effect: Effect | None
-    span: Span = _span()
+    span: Span = span_field()
+    repeats: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What ``:observe`` gives: a formula (one atom, or a conjunction of them), or a noisy
+    """What ``:observe`` or ``:sensed`` gives: a formula (one atom, or a conjunction of them), or a noisy
     distribution written as an effect."""
 
     content: Formula | Probabilistic
-    span: Span = _span()
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class SensingModel:
+    """``:sensing-model``, or ``:observation``, which may have chance: what is observed, each value under the
+    condition that makes it so."""
+
+    effect: Effect
+    span: Span = span_field()
+    word: Literal["sensing-model", "observation"] = "sensing-model"
 
 
 @dataclass(frozen=True, slots=True)
 class Derived:
-    """``(:derived (p ?x) formula)`` and ``(:axiom :vars … :context … :implies …)``."""
+    """``(:derived (p ?x) formula)`` and ``(:axiom :vars … :context … :implies …)``; the latter may have a
+    ``label``, and derive ``others`` besides."""
 
     kind: Literal["derived", "axiom"]
     parameters: TypedList
     head: Atom
     condition: Formula
-    span: Span = _span()
+    span: Span = span_field()
+    label: Name | None = None
+    others: tuple[Atom, ...] = ()
+
+    @property
+    def heads(self) -> tuple[Atom, ...]:
+        """All that is derived."""
+        return self.head, *self.others
+
+
+@dataclass(frozen=True, slots=True)
+class StateVariable:
+    """``(:variable name value…)`` and ``(:obs-variable …)``: exactly one of several values holds, or the only
+    one does or not. A value is an atom, or ``(forall (params) atom)``."""
+
+    kind: Literal["variable", "obs-variable"]
+    name: Name
+    parameters: TypedList | None
+    values: tuple[Formula, ...]
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class AtomList:
+    """``(:observable value…)``: what is always told; ``(:sticky value…)``: what stays true. Values are those
+    of a :class:`StateVariable`."""
+
+    kind: Literal["observable", "sticky"]
+    values: tuple[Formula, ...]
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class DefaultSensing:
+    """``(:default-sensing-model effect)``: the :class:`SensingModel` of every action without one."""
+
+    effect: Effect
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class Observables:
+    """``(:observables (name params)…)`` or ``(:observations …)``: predicates that stand for what is told."""
+
+    kind: Literal["observables", "observations"]
+    declarations: tuple[PredicateDeclaration, ...]
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class ObservationModel:
+    """``(:observation name :parameters … :condition f :distribution e)``: after each action, where the
+    condition holds, an observable is told as the distribution draws it."""
+
+    name: Name
+    parameters: TypedList
+    condition: Formula | None
+    distribution: Effect
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -428,8 +394,9 @@ class Sensor:
     name: Name
     parameters: TypedList
     condition: Formula | None
-    sensed: Formula
-    span: Span = _span()
+    sensed: Observation
+    span: Span = span_field()
+    repeats: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -441,7 +408,7 @@ class Template:
     precondition: Formula | None
     effect: Effect | None
     body: Body
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -449,7 +416,7 @@ class DomainReference:
     """``(:domain name)``."""
 
     name: Name
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -458,7 +425,7 @@ class FluentValue:
 
     fluent: FluentRef
     value: Number
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -466,7 +433,7 @@ class InitClause:
     """``(or …)`` and other uncertain formulas in ``:init``."""
 
     formula: Formula
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -474,15 +441,17 @@ class InitAnd:
     """``(and …)`` in ``:init``: unlike an effect's, its parts may be clauses and numbers."""
 
     parts: tuple[InitElement, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
 class Invariant:
-    """``(invariant f…)`` in ``:init``: at least one of the formulas holds in every reachable state."""
+    """``(invariant f…)`` or ``(at-least-one f…)`` in ``:init``: at least one of the formulas holds, of an
+    invariant in every reachable state."""
 
     parts: tuple[Formula, ...]
-    span: Span = _span()
+    span: Span = span_field()
+    word: Literal["invariant", "at-least-one"] = "invariant"
 
 
 InitElement: TypeAlias = (
@@ -504,7 +473,33 @@ class Init:
     """``(:init …)``."""
 
     elements: tuple[InitElement, ...]
-    span: Span = _span()
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class FactBelief:
+    """``(prob p 0.3)``: how probable a fact is, by itself."""
+
+    atom: Atom
+    probability: Number
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class JointBelief:
+    """``(joint 0.5 (and p (not q)))``: how probable it is that literals hold together."""
+
+    probability: Number
+    condition: Formula
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class InitBelief:
+    """``(:init-belief …)``: what is believed at the start, in the place of ``:init``."""
+
+    elements: tuple[FactBelief | JointBelief, ...]
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -513,7 +508,7 @@ class Hidden:
     planner may use."""
 
     facts: tuple[Assign, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -521,7 +516,7 @@ class Goal:
     """``(:goal formula)``."""
 
     formula: Formula
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -530,7 +525,7 @@ class GoalNumber:
 
     kind: Literal["goal-probability", "goal-reward"]
     value: Number
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -539,7 +534,7 @@ class Metric:
 
     direction: Literal["minimize", "maximize"]
     expression: NumericExpression
-    span: Span = _span()
+    span: Span = span_field()
 
 
 Section: TypeAlias = (
@@ -550,9 +545,15 @@ Section: TypeAlias = (
     | Action
     | Derived
     | Sensor
+    | StateVariable
+    | AtomList
+    | DefaultSensing
+    | Observables
+    | ObservationModel
     | Template
     | DomainReference
     | Init
+    | InitBelief
     | Hidden
     | Goal
     | GoalNumber
@@ -571,7 +572,7 @@ class Definition:
     kind: Literal["domain", "problem"]
     name: Name
     sections: tuple[Section, ...]
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -580,7 +581,7 @@ class Comment:
 
     text: str
     own_line: bool
-    span: Span = _span()
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,13 +26,18 @@ _SECTIONS = frozenset(
     (
         *(":requirements", ":types", ":constants", ":predicates", ":functions"),
         *(":action", ":derived", ":axiom", ":sensor", ":template", ":durative-action", ":constraints"),
+        *(":variable", ":obs-variable", ":default-sensing-model", ":observable", ":sticky"),
+        *(":observables", ":observations", ":observation", ":init-belief"),
         *(":domain", ":objects", ":init", ":hidden", ":goal", ":goal-probability", ":goal-reward", ":metric"),
     )
 )
 _FIELDS = {
-    ":action": frozenset((":parameters", ":precondition", ":observe", ":sensing-model", ":effect")),
+    ":action": frozenset(
+        (":parameters", ":precondition", ":observe", ":sensing-model", ":observation", ":repeats", ":effect")
+    ),
+    ":observation": frozenset((":parameters", ":condition", ":distribution")),
     ":template": frozenset((":parameters", ":precondition", ":effect", ":body")),
-    ":sensor": frozenset((":parameters", ":condition", ":sense", ":sensed")),
+    ":sensor": frozenset((":parameters", ":condition", ":sense", ":sensed", ":repeats")),
     ":axiom": frozenset((":parameters", ":vars", ":context", ":body", ":implies", ":head")),
 }
 

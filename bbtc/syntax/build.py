@@ -68,19 +68,27 @@ class Effect(Field[ast.Effect]):
     """``:effect``."""
 
 
-class Observe(Field[ast.Observation]):
-    """``:observe``."""
+class Observe(Field[ast.Observation | ast.SensingModel]):
+    """``:observe``, ``:sensing-model``."""
+
+
+class Distribution(Field[ast.Effect]):
+    """``:distribution``."""
+
+
+class Repeats(Field[bool]):
+    """``:repeats``."""
 
 
 class Body(Field[ast.Body]):
     """``:body`` of a template."""
 
 
-class Sensed(Field[ast.Formula]):
+class Sensed(Field[ast.Observation]):
     """``:sensed``."""
 
 
-class Implied(Field[ast.Atom]):
+class Implied(Field[ast.Formula]):
     """``:implies``."""
 
 
@@ -223,6 +231,7 @@ class Builder(Expressions):
             fields.get(Observe),
             fields.get(Effect),
             head.to(close),
+            fields.get(Repeats) is True,
         )
 
     def template(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Template:
@@ -244,30 +253,47 @@ class Builder(Expressions):
             fields.get(Condition),
             fields.need(Sensed, ":sensed", "the sensor", name),
             head.to(close),
+            fields.get(Repeats) is True,
         )
 
     def axiom(self, head: Token, given: list[Field[object]], close: Token) -> ast.Derived:
         fields = _Fields(given)
+        implied = fields.need(Implied, ":implies", "the axiom", head)
+        parts = implied.parts if isinstance(implied, ast.And) else (implied,)
+        heads = [part for part in parts if isinstance(part, ast.Atom)]
+        if not heads or len(heads) < len(parts):
+            message = "an axiom derives an atom `(p ?x)`, or an `and` of atoms"
+            raise Misuse("BBT0101", message, implied.span)
         return ast.Derived(
             "axiom",
             fields.parameters(close),
-            fields.need(Implied, ":implies", "the axiom", head),
+            heads[0],
             fields.need(Condition, ":context", "the axiom", head),
             head.to(close),
+            None,
+            tuple(heads[1:]),
         )
+
+    def axiom_named(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Derived:
+        return replace(self.axiom(head, given, close), label=leaves.name(name))
 
     parameters = axiom_parameters = Parameters
     precondition = sensor_condition = axiom_context = Condition
     effect = Effect
     template_body = Body
-    sensed = Sensed
     axiom_head = Implied
 
+    def repeats(self, keyword: Token) -> Repeats:
+        return Repeats(keyword, True)
+
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
-        first, last = formulas[0].span, formulas[-1].span
-        span = Span(first.source, first.start, last.end)
-        content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
-        return Observe(keyword, ast.Observation(content, span))
+        return Observe(keyword, _observed(formulas))
+
+    def sensed(self, keyword: Token, formulas: list[ast.Formula]) -> Sensed:
+        return Sensed(keyword, _observed(formulas))
+
+    def sensed_noisy(self, keyword: Token, content: ast.Probabilistic) -> Sensed:
+        return Sensed(keyword, ast.Observation(content, content.span))
 
     def observe_noisy(self, keyword: Token, content: ast.Probabilistic) -> Observe:
         return Observe(keyword, ast.Observation(content, content.span))
@@ -276,9 +302,10 @@ class Builder(Expressions):
         message = "`:observe-agent`, an observation by one of several agents, is not supported"
         raise Misuse("BBT0212", message, keyword.span)
 
-    def sensing_model(self, keyword: Token, _effect: ast.Effect) -> Observe:
-        message = "`:sensing-model`, in which an action tells of declared variables, is not supported"
-        raise Misuse("BBT0212", message, keyword.span, "say `:observe` of the facts that it tells")
+    def sensing_model(self, keyword: Token, effect: ast.Effect) -> Observe:
+        word: Literal["sensing-model", "observation"]
+        word = "observation" if keyword.kind == "OBSERVATION" else "sensing-model"
+        return Observe(keyword, ast.SensingModel(effect, effect.span, word))
 
     derived_head = DerivedHead
 
@@ -288,6 +315,64 @@ class Builder(Expressions):
         name = leaves.declared("predicate", next(leaves.names(head.name)))
         atom = ast.Atom(name, args, head.name.to(head.close))
         return ast.Derived("derived", parameters, atom, condition, form.to(close))
+
+    # --- forms of K-replanner ----------------------------------------------------------------
+
+    def state_variable(
+        self, head: Token, name: Token, values: list[ast.Formula], close: Token
+    ) -> ast.StateVariable:
+        return _state_variable(head, leaves.name(name), None, values, close)
+
+    def state_variables(
+        self, head: Token, named: DerivedHead, values: list[ast.Formula], close: Token
+    ) -> ast.StateVariable:
+        name = next(leaves.names(named.name))
+        return _state_variable(head, name, parameters_of(named.parameters, close), values, close)
+
+    def told_always(self, head: Token, values: list[ast.Formula], close: Token) -> ast.AtomList:
+        kind: Literal["observable", "sticky"] = "observable" if head.kind == "OBSERVABLE" else "sticky"
+        return ast.AtomList(kind, _values(values), head.to(close))
+
+    def default_sensing(self, head: Token, effect: ast.Effect, close: Token) -> ast.DefaultSensing:
+        return ast.DefaultSensing(effect, head.to(close))
+
+    # --- forms of PO-PDDL, and of the competition of 2011 ------------------------------------
+
+    def observables(self, head: Token, declarations: list[_Predicate], close: Token) -> ast.Observables:
+        kind: Literal["observables", "observations"]
+        kind = "observables" if keyword(head) == ":observables" else "observations"
+        return ast.Observables(kind, tuple(declarations), head.to(close))
+
+    distribution = Distribution
+
+    def branches(self, keyword: Token, _formula: ast.Formula) -> Distribution:
+        message = "`:branches`, in which a translation lists what may be observed, is not supported"
+        raise Misuse("BBT0212", message, keyword.span, "give the file that was translated")
+
+    def observation(
+        self, head: Token, name: Token, given: list[Field[object]], close: Token
+    ) -> ast.ObservationModel:
+        fields = _Fields(given)
+        return ast.ObservationModel(
+            leaves.name(name),
+            fields.parameters(close),
+            fields.get(Condition),
+            fields.need(Distribution, ":distribution", "the observation", name),
+            head.to(close),
+        )
+
+    def init_belief(
+        self, head: Token, elements: list[ast.FactBelief | ast.JointBelief], close: Token
+    ) -> ast.InitBelief:
+        return ast.InitBelief(tuple(elements), head.to(close))
+
+    def fact_belief(self, head: Token, atom: ast.Atom, number: Token, close: Token) -> ast.FactBelief:
+        return ast.FactBelief(atom, self.number(number), head.to(close))
+
+    def joint_belief(
+        self, head: Token, number: Token, condition: ast.Formula, close: Token
+    ) -> ast.JointBelief:
+        return ast.JointBelief(self.number(number), condition, head.to(close))
 
     # --- problems ----------------------------------------------------------------------------
 
@@ -348,7 +433,9 @@ class Builder(Expressions):
         return ast.InitClause(self.negation(head, part, close), head.to(close))
 
     def invariant(self, head: Token, parts: list[ast.Formula], close: Token) -> ast.Invariant:
-        return ast.Invariant(tuple(parts), head.to(close))
+        word: Literal["invariant", "at-least-one"]
+        word = "invariant" if keyword(head) == "invariant" else "at-least-one"
+        return ast.Invariant(tuple(parts), head.to(close), word)
 
     def timed_literal(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
         return unsupported("timed initial literal", head, close)
@@ -376,8 +463,33 @@ class Builder(Expressions):
     # --- what is refused by name -------------------------------------------------------------
 
     def unsupported_section(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
-        word = keyword(head)
-        return unsupported(":axiom NAME" if word == ":axiom" else word, head, close)
+        return unsupported(keyword(head), head, close)
+
+
+def _observed(formulas: list[ast.Formula]) -> ast.Observation:
+    first, last = formulas[0].span, formulas[-1].span
+    span = Span(first.source, first.start, last.end)
+    content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
+    return ast.Observation(content, span)
+
+
+def _state_variable(
+    head: Token, name: ast.Name, parameters: ast.TypedList | None, values: list[ast.Formula], close: Token
+) -> ast.StateVariable:
+    kind: Literal["variable", "obs-variable"]
+    kind = "variable" if keyword(head) == ":variable" else "obs-variable"
+    return ast.StateVariable(kind, name, parameters, _values(values), head.to(close))
+
+
+def _values(values: list[ast.Formula]) -> tuple[ast.Formula, ...]:
+    for value in values:
+        inner = value
+        while isinstance(inner, ast.Quantified) and inner.kind == "forall":
+            inner = inner.part
+        if not isinstance(inner, ast.Atom):
+            message = "each is an atom `(p a)`, or `(forall (?x - t) (p ?x))`"
+            raise Misuse("BBT0101", message, value.span)
+    return tuple(values)
 
 
 def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: bool = False) -> _Predicate:

@@ -154,6 +154,12 @@ class Expressions:
     def test(self, head: Token, atom: ast.Atom, close: Token) -> ast.Test:
         return ast.Test("known" if head.kind == "KNOWN" else "unknown", atom, head.to(close))
 
+    def believed(self, head: Token, part: ast.Formula, number: Token, close: Token) -> ast.Believed:
+        return ast.Believed(part, self.number(number), head.to(close))
+
+    def test_believed(self, head: Token, part: ast.Believed, close: Token) -> ast.Test:
+        return ast.Test("known" if head.kind == "KNOWN" else "unknown", part, head.to(close))
+
     def comparison(
         self, head: Token, left: Operand, right: Operand, close: Token
     ) -> ast.Equality | ast.Unsupported:

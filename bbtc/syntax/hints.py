@@ -66,6 +66,8 @@ _FIELDS = {
     "CONDITION_FIELD": ":condition",
     "OBSERVE": ":observe",
     "SENSED": ":sensed",
+    "REPEATS": ":repeats",
+    "DISTRIBUTION": ":distribution",
     "CONTEXT": ":context",
     "IMPLIES": ":implies",
     "EFFECT": ":effect",

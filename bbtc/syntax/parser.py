@@ -6,6 +6,7 @@ from functools import lru_cache
 
 from bbtc.collector import collector_paused
 from bbtc.diagnostics import Report
+from bbtc.limits import MOST_WORLDS
 from bbtc.source import SourceFile, Span
 from bbtc.syntax import ast, scan
 from bbtc.syntax.build import Builder
@@ -36,6 +37,10 @@ def parse(source: SourceFile, report: Report, max_depth: int = MAX_DEPTH) -> ast
         report.error(
             "BBT0005", f"parentheses are nested more than {max_depth} deep", Span(source, deep, deep + 1)
         )
+        return ast.Document(source)
+    crowded = scan.too_many_branches(text, source, MOST_WORLDS)
+    if crowded is not None:
+        report.add(crowded)
         return ast.Document(source)
     with collector_paused():
         definitions = _definitions(text, source, report, max_depth)

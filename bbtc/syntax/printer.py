@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeAlias
 
 from typing_extensions import assert_never
 
@@ -15,6 +15,7 @@ from bbtc.syntax.layout import Doc, Setter, has_empty_lines
 from bbtc.syntax.scan import without_comments
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
+_Schema: TypeAlias = ast.Action | ast.Template | ast.Sensor | ast.ObservationModel
 
 
 def print_document(document: ast.Document) -> str:
@@ -73,10 +74,18 @@ class _Docs:
                 return self.listed("(:predicates", map(self.predicate, node.declarations), node, apart=True)
             case ast.Functions():
                 return self.listed("(:functions", map(self.function, node.declarations), node)
-            case ast.Action() | ast.Template() | ast.Sensor():
+            case ast.Action() | ast.Template() | ast.Sensor() | ast.ObservationModel():
                 return self.schema(node)
             case ast.Derived():
                 return self.derived(node)
+            case (
+                ast.StateVariable()
+                | ast.AtomList()
+                | ast.DefaultSensing()
+                | ast.Observables()
+                | ast.InitBelief()
+            ):
+                return self.of_dialect(node)
             case ast.DomainReference():
                 return Doc("(:domain", (_leaf(node.name),), ")", node.span, glued=1)
             case ast.Init():
@@ -105,29 +114,39 @@ class _Docs:
         broken = len(parts) > 1 and (apart or has_empty_lines(parts))
         return Doc(head, parts, ")", node.span, broken=broken, airy=True, rows=not apart)
 
-    def schema(self, node: ast.Action | ast.Template | ast.Sensor) -> Doc:
+    def schema(self, node: _Schema) -> Doc:
         """An action, a template or a sensor: name, parameters, and the fields that are given."""
         after, span = node.name.span.end, node.span
         fields: list[Doc] = []
         if node.parameters or self._word(":parameters", after, span):
             fields.append(self.parameters(node.parameters, after, span, ":parameters"))
-        for word, value in _fields(node):
+        for names, value in _fields(node):
+            word = self._spelt(names.split(), after, span)
             match value:
-                case None:
+                case None | False:
+                    continue
+                case True:
+                    fields.append(Doc(word, (), "", self._word(word, after, span)))
                     continue
                 case ast.Observation():
                     doc = self.observed(value.content)
-                case _ if word == ":effect":
+                case ast.SensingModel():
+                    doc = self.effect(value.effect)
+                case _ if word in {":effect", ":distribution"}:
                     doc = self.effect(value)
                 case _ if word == ":body":
                     doc = self.body(value)
                 case _:
                     doc = self.formula(value)
             fields.append(self.field(word, doc, after, span))
-        head = f"(:{type(node).__name__.lower()}"
+        head = f"(:{type(node).__name__.lower().removesuffix('model')}"
         return Doc(
             head, (_leaf(node.name), *_in_source_order(fields)), ")", span, 1, broken=True, spaced=True
         )
+
+    def _spelt(self, words: Sequence[str], after: int, span: Span) -> str:
+        """Of words that mean the same, the one that stands in a form; the first where none does."""
+        return next((word for word in words if self._word(word, after, span)), words[0])
 
     def field(self, word: str, value: Doc, after: int, span: Span) -> Doc:
         """``:word value``."""
@@ -159,13 +178,50 @@ class _Docs:
             )
             return Doc("(:derived", (head, condition), ")", node.span, glued=1, spaced=True)
         start, span = node.span.start, node.span
+        word = self._spelt((":vars", ":parameters"), start, span)
         fields = [
-            self.parameters(node.parameters, start, span, ":vars") if node.parameters else None,
-            self.field(":context", condition, start, span),
-            self.field(":implies", self.atom(node.head), start, span),
+            self.parameters(node.parameters, start, span, word) if node.parameters else None,
+            self.field(self._spelt((":context", ":body"), start, span), condition, start, span),
+            self.field(self._spelt((":implies", ":head"), start, span), self.implied(node), start, span),
         ]
         parts = _in_source_order([part for part in fields if part])
-        return Doc("(:axiom", parts, ")", span, broken=True, spaced=True)
+        label = () if node.label is None else (_leaf(node.label),)
+        return Doc("(:axiom", (*label, *parts), ")", span, len(label), broken=True, spaced=True)
+
+    def implied(self, node: ast.Derived) -> Doc:
+        heads = tuple(map(self.atom, node.heads))
+        if not node.others:
+            return heads[0]
+        around = self._parentheses(node.head.span.start, node.others[-1].span.end, node.span)
+        return Doc("(and", heads, ")", around)
+
+    def belief(self, node: ast.FactBelief | ast.JointBelief) -> Doc:
+        """``(prob p 0.3)``, ``(joint 0.5 f)``."""
+        if isinstance(node, ast.FactBelief):
+            return Doc("(prob", (self.atom(node.atom), _number(node.probability)), ")", node.span, glued=1)
+        parts = (_number(node.probability), self.formula(node.condition))
+        return Doc("(joint", parts, ")", node.span, glued=1)
+
+    def of_dialect(
+        self,
+        node: ast.StateVariable | ast.AtomList | ast.DefaultSensing | ast.Observables | ast.InitBelief,
+    ) -> Doc:
+        """The forms of other planners, such as ``(:variable (name ?x - t) value…)``."""
+        if isinstance(node, ast.Observables):
+            return self.listed(f"(:{node.kind}", map(self.predicate, node.declarations), node, apart=True)
+        if isinstance(node, ast.InitBelief):
+            return self.listed("(:init-belief", map(self.belief, node.elements), node)
+        if isinstance(node, ast.AtomList):
+            return self.listed(f"(:{node.kind}", map(self.formula, node.values), node)
+        if isinstance(node, ast.DefaultSensing):
+            return Doc("(:default-sensing-model", (self.effect(node.effect),), ")", node.span)
+        name = _leaf(node.name)
+        if node.parameters is not None:
+            last = node.parameters[-1].span.end if node.parameters else node.name.span.end
+            around = self._parentheses(node.name.span.start, last, node.span)
+            name = Doc(f"({node.name.text}", self.groups(node.parameters), ")", around, filled=True)
+        values = tuple(map(self.formula, node.values))
+        return Doc(f"(:{node.kind}", (name, *values), ")", node.span, glued=1)
 
     # --- declarations ------------------------------------------------------------------------
 
@@ -227,7 +283,7 @@ class _Docs:
             case ast.InitClause():
                 return self.formula(node.formula)
             case ast.Invariant():
-                return Doc("(invariant", tuple(map(self.formula, node.parts)), ")", node.span)
+                return Doc(f"({node.word}", tuple(map(self.formula, node.parts)), ")", node.span)
             case ast.OneOf(parts) if all(isinstance(part, ast.Assign) for part in parts):
                 # Files list hundreds of these: where something is.
                 return Doc("(oneof", tuple(map(self.effect, parts)), ")", node.span, rows=True)
@@ -266,7 +322,10 @@ class _Docs:
                 typed = self.parameters(node.parameters, node.span.start + 1, node.span)
                 return Doc(f"({node.kind}", (typed, self.formula(node.part)), ")", node.span, glued=1)
             case ast.Test():
-                return Doc(f"({node.kind}", (self.atom(node.atom),), ")", node.span, glued=1)
+                return Doc(f"({node.kind}", (self.formula(node.atom),), ")", node.span, glued=1)
+            case ast.Believed():
+                parts = (self.formula(node.part), _number(node.at_least))
+                return Doc("(believed", parts, ")", node.span, glued=1)
             case ast.Unsupported():
                 return self.unsupported(node)
             case _:
@@ -393,15 +452,23 @@ class _Docs:
         return Doc(node.text, span=node.span)
 
 
-def _fields(node: ast.Action | ast.Template | ast.Sensor) -> list[tuple[str, Any]]:
+def _fields(node: _Schema) -> list[tuple[str, Any]]:
     match node:
         case ast.Action():
-            observed = (":observe", node.observe)
-            return [(":precondition", node.precondition), observed, (":effect", node.effect)]
+            tells = f":{node.observe.word}" if isinstance(node.observe, ast.SensingModel) else ":observe"
+            observed = (tells, node.observe)
+            repeats = (":repeats", node.repeats)
+            return [(":precondition", node.precondition), observed, repeats, (":effect", node.effect)]
         case ast.Template():
             return [(":precondition", node.precondition), (":effect", node.effect), (":body", node.body)]
+        case ast.ObservationModel():
+            return [(":condition", node.condition), (":distribution", node.distribution)]
         case ast.Sensor():
-            return [(":condition", node.condition), (":sensed", node.sensed)]
+            return [
+                (":condition", node.condition),
+                (":sensed :sense", node.sensed),
+                (":repeats", node.repeats),
+            ]
         case _:
             assert_never(node)
 

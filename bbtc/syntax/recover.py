@@ -26,7 +26,7 @@ MAX_ERRORS = 20
 # All parses after the first take no more than this many characters in all.
 _RECOVERY_CHARACTERS = 20_000_000
 # Sections whose parts stand on their own: an error in one part leaves the others readable.
-_LISTS = frozenset((":init", ":predicates", ":functions", ":hidden"))
+_LISTS = frozenset((":init", ":init-belief", ":predicates", ":functions", ":hidden"))
 _PARENTHESIS = re.compile(r"[()]")
 _WORDS = re.compile(r"\)|(?:[^\s()]+\s*)*")
 _FIELD = re.compile(r"[()]|(?<![^\s()]):[a-z-]+", re.IGNORECASE | re.ASCII)

@@ -53,6 +53,37 @@ def too_deep(text: str, limit: int) -> int | None:
     return None
 
 
+_DRAW_CODES = {"oneof": "BBT0404", "probabilistic": "BBT0403"}
+_INIT = re.compile(r"\(\s*:init(?=[\s()])", re.IGNORECASE)
+_MARK = re.compile(r"\(\s*(oneof|probabilistic)?(?![^\s()])|[()]", re.IGNORECASE)
+
+
+def too_many_branches(text: str, source: SourceFile, most: int) -> Diagnostic | None:
+    """What is said of the first draw in ``:init`` with more branches than ``most``, each in parentheses: such
+    files, often of many megabytes, are refused before all of it is read."""
+    for init in _INIT.finditer(text) if len(text) > 3 * most else ():
+        forms: list[str] = []
+        starts: list[int] = []
+        branches: list[int] = []
+        for mark in _MARK.finditer(text, init.start()):
+            if mark.group() == ")":
+                del forms[-1], starts[-1], branches[-1]
+                if not forms:
+                    break
+                continue
+            if forms:
+                branches[-1] += 1
+                if branches[-1] > most and forms[-1]:
+                    message = f"a `{forms[-1]}` in `:init` has more than {most:,} branches"
+                    hint = "worlds are listed one by one: draw facts that are independent on their own"
+                    place = source.span(starts[-1], text.index(forms[-1], starts[-1]) + len(forms[-1]))
+                    return Diagnostic(_DRAW_CODES[forms[-1].lower()], message, place, hint)
+            forms.append(mark[1] or "")
+            starts.append(mark.start())
+            branches.append(0)
+    return None
+
+
 _MEANT = {
     **dict.fromkeys("\u2010\u2011\u2012\u2013\u2014\u2212", "write a plain `-`"),
     **dict.fromkeys("\u00a0\u2002\u2003\u2009\u202f\ufeff", "write a plain space"),

@@ -346,19 +346,38 @@ class HiddenText(Lifted):
             self._after[name, belief] = self._results(name, belief)
         return self._after[name, belief]
 
-    def _results(self, name: str, belief: Belief) -> dict[Belief, Fraction]:
-        move, by_told = self.moves[name], dict[_Told, dict[World, Fraction]]()
+    def happens(self, name: str, belief: Belief) -> Iterator[tuple[World, _Told, World, Fraction]]:
+        """What an action may do: the world before it, what is seen then, the world after, the probability."""
+        move = self.moves[name]
         for values, world, p in self.values_in(belief):
             for q, change, _ in self.effect(move.effect, move.bound, values):
                 for after, r in self._drawn_anew(world, change):
-                    seen = after - self.hidden
                     for told, s in self.readings(name, move.bound, after).items():
-                        mass = by_told.setdefault((seen, told), {})
-                        mass[after] = mass.get(after, Fraction(0)) + p * q * r * s
+                        yield world, (after - self.hidden, told), after, p * q * r * s
+
+    def _results(self, name: str, belief: Belief) -> dict[Belief, Fraction]:
         found: dict[Belief, Fraction] = {}
-        for mass in by_told.values():
+        for mass in self._by_told(name, belief).values():
             after_it = _belief(mass)
             found[after_it] = found.get(after_it, Fraction(0)) + sum(mass.values())
+        return found
+
+    def _by_told(self, name: str, belief: Belief) -> dict[_Told, dict[World, Fraction]]:
+        by_told: dict[_Told, dict[World, Fraction]] = {}
+        for _, told, after, p in self.happens(name, belief):
+            mass = by_told.setdefault(told, {})
+            mass[after] = mass.get(after, Fraction(0)) + p
+        return by_told
+
+    def results_in(self, name: str, belief: Belief, world: World) -> dict[tuple[Belief, World], Fraction]:
+        """What an action leads to in one of the worlds of a belief: what is believed, and the world after."""
+        beliefs = {told: _belief(mass) for told, mass in self._by_told(name, belief).items()}
+        whole = dict(belief)[world]
+        found: dict[tuple[Belief, World], Fraction] = {}
+        for before, told, after, p in self.happens(name, belief):
+            if before == world:
+                both = beliefs[told], after
+                found[both] = found.get(both, Fraction(0)) + p / whole
         return found
 
     def mdp(self, most: int) -> Mdp:

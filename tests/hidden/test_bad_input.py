@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 
 from bbtc.codes import CODES
 from bbtc.diagnostics import BbtcError, LimitReached, Report
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources
 from bbtc.source import SourceFile
+from bbtc.syntax.parser import parse
 from tests.hidden.texts import texts
 from tests.long_form import amount
 from tests.profiles import examples
@@ -49,12 +51,31 @@ def refusals(text: str) -> list[tuple[str, str]]:
         ("(probabilistic 1.5 (h))", "BBT0210", "1.5"),
         ("(probabilistic -0.5 (h))", "BBT0210", "-0.5"),
         ("(unknown (h)) (h)", "BBT0223", None),
+        ("(oneof)", "BBT0418", "(oneof)"),
+        ("(unknown (h)) (oneof)", "BBT0418", "(oneof)"),
+        ("(oneof (h) (and (i) (oneof)))", "BBT0418", "(oneof)"),
+        ("(forall (?x) (oneof))", "BBT0418", "(oneof)"),
+        ("(unknown (h)) (or)", "BBT0418", "(or)"),
+        ("(and (h) (or))", "BBT0418", "(or)"),
     ],
 )  # fmt: skip
 def test_a_start_that_cannot_be(init: str, code: str, place: str | None) -> None:
     found = refusals(TEXT.format(told="(h)", init=init))
     assert [each for each, _ in found] == [code]
     assert place is None or found[0][1] == place
+
+
+def test_an_effect_of_one_of_nothing_is_refused() -> None:
+    text = TEXT.format(told="(h)", init="(unknown (h))").replace(":effect (done)", ":effect (oneof)")
+    assert refusals(text) == [("BBT0418", "(oneof)")]
+
+
+@pytest.mark.parametrize("init", ["(oneof (h))", "(unknown (i)) (oneof (h))", "(unknown (i)) (or (h))"])
+def test_one_of_one_is_so(init: str) -> None:
+    source = SourceFile("x.pddl", TEXT.format(told="(i)", init=init))
+    task = compile_sources([source], Report(), Limits())
+    (at,) = (number for number, variable in enumerate(task.variables) if variable.name == "h()")
+    assert [state.values[at] for state in task.initial] == [Truth.TRUE]
 
 
 @pytest.mark.parametrize(
@@ -88,8 +109,31 @@ def test_a_draw_of_very_many_branches_is_refused() -> None:
       (:action go :parameters (?x) :precondition (p ?x) :effect (done)))
     (define (problem x) (:domain d) (:objects {names})
       (:init (oneof {" ".join(f"(p {name})" for name in names.split())})) (:goal (done)))"""
-    (found,) = refusals(text)
-    assert found[0] == "BBT0404"
+    assert refusals(text) == [("BBT0404", "(oneof")]
+
+
+@pytest.mark.parametrize(
+    ("draw", "code"),
+    [
+        ("(oneof {} )", "BBT0404"),
+        ("(OneOf (and {}) (oneof {}))", "BBT0404"),
+        ("(probabilistic {w} )", "BBT0403"),
+        ("(and {} (oneof (h) (and (not (i)) {}) (i)))", None),
+        ("(oneof (h) (i))) (:goal (or {})", None),
+    ],
+)
+def test_only_branches_of_draws_in_init_are_counted(draw: str, code: str | None) -> None:
+    many = 4_100
+    facts, weighted = " ".join(["(h)"] * many), " ".join(["1/5000 (h)"] * many)
+    text = TEXT.format(told="(h)", init=draw.replace("{w}", weighted).replace("{}", facts))
+    codes = {each.code for each in _read(text)}
+    assert codes == (set() if code is None else {code})
+
+
+def _read(text: str) -> Report:
+    report = Report()
+    parse(SourceFile("x.pddl", text), report)
+    return report
 
 
 WORDS = [

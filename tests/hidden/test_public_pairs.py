@@ -13,12 +13,54 @@ from bbtc.limits import Limits
 from bbtc.source import SourceFile
 from tests.conftest import corpus_folder
 from tests.corpus import read_corpus
+from tests.hidden import public_pairs
 from tests.long_form import amount
 
 FAMILIES = ("contingent", "contingent-prob")
+DIALECTS = ("krep", "pomdp")
+REFUSED = {
+    # Parts of a condition that read one component and much that is seen.
+    "krep/fsc-grid-axis": {"BBT0416"},
+    "krep/fsc-grid-rot": {"BBT0416"},
+    # Worlds without number: at least one of the places, and pits anywhere.
+    "krep/localize": {"BBT0415"},
+    "krep/rocksample": {"BBT0415"},
+    "krep/wumpus-diagonal": {"BBT0415"},
+    "krep/wumpus-full": {"BBT0415"},
+    "krep/wumpus-short": {"BBT0415"},
+    # Files that only hold hidden facts, misspelt names, and a domain in which the goal cannot be reached.
+    "krep/mv-localize": {"BBT0213"},
+    "krep/mv-medpks": {"BBT0203", "BBT0213"},
+    "krep/mv-rocksample": {"BBT0202", "BBT0203", "BBT0213"},
+    "krep/mv-wumpus": {"BBT0203", "BBT0213", "BBT0412", "BBT0415"},
+    "pomdp/dtpddl-rovers": {"BBT0212"},
+    # Without a goal; and a sensor that errs differently.
+    "pomdp/ippc11-po-ppddl": {"BBT0411", "BBT0421"},
+    # A problem of another domain.
+    "pomdp/po-pddl": {"BBT0202", "BBT0207", "BBT0211"},
+}
+"""By folder of the dialects: the codes that refuse some of its pairs."""
+_SMALL = 30_000
 LARGE = 150_000  # bytes of domain and problem; the largest take half a minute
 UNREACHABLE = {"contingent/sdr-sokoban/sokoban-p.old.pddl"}
 """A problem with walls around a stone."""
+
+
+def _in_dialects() -> list[tuple[str, str]]:
+    folder = corpus_folder()
+    if folder is None:
+        return []
+    found = list(public_pairs.pairs(folder, DIALECTS))
+    small = [pair for pair in found if sum((folder / path).stat().st_size for path in pair) < _SMALL]
+    return found if amount(0, 1) else small[::4]
+
+
+@pytest.mark.parametrize(("domain", "problem"), _in_dialects(), ids=lambda path: path.replace("/", "-"))
+def test_a_pair_in_a_dialect_compiles_or_is_refused_by_name(domain: str, problem: str, corpus: Path) -> None:
+    found = public_pairs.fate(corpus, domain, problem)
+    assert found == public_pairs.COMPILED or {*found.split()} <= REFUSED.get(
+        public_pairs.place(problem), set()
+    )
 
 
 def _pairs() -> list[tuple[str, str]]:

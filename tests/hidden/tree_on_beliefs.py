@@ -12,7 +12,7 @@ from bbtc.ground.task import Task
 from tests.domains.lifted import Fact, Move, TooLarge
 from tests.domains.lifted_tree import FAILURE, RUNNING, SUCCESS, Node, Point, TreeOnText
 from tests.hidden.exact_mdp import Row, reached
-from tests.hidden.reference import Belief, HiddenText
+from tests.hidden.reference import Belief, HiddenText, World
 
 _MOST_POINTS = 400
 
@@ -95,6 +95,32 @@ class TreeOnBeliefs(TreeOnText):
             reached(rows, column)[0] for column in zip(*stopped, strict=True)
         )
         return Ends(success, without, failure, blocked, faults)
+
+    def success_in(self, world: World) -> Fraction:
+        """How often it succeeds with the goal true, if this world is the case at the start. Raises
+        :class:`TooLarge` for too many points."""
+        text, won = self.text, list[Fraction]()
+        points = [(Point(text.prior, frozenset(), frozenset()), world)]  # type: ignore[arg-type]
+        number = {points[0]: 0}
+        rows: dict[int, Row] = {}
+        for at, (point, real) in enumerate(points):
+            belief: Belief = point.state  # type: ignore[assignment]
+            ticked = self.tick(self.root, point, self.knowledge(belief))
+            if isinstance(ticked, int):
+                values = next(values for values, other, _ in text.values_in(belief) if other == real)
+                won.append(Fraction(ticked == SUCCESS and text.value(text.goal, {}, values) == 2))
+                continue
+            won.append(Fraction(0))
+            rows[at] = []
+            for (after, then), p in text.results_in(ticked["action"], belief, real).items():
+                follower = self._after(point, ticked, after), then
+                if follower not in number:
+                    number[follower] = len(points)
+                    points.append(follower)
+                rows[at].append((number[follower], p))
+            if len(points) > _MOST_POINTS:
+                raise TooLarge
+        return reached(rows, won)[0]
 
     def _after(self, point: Point, started: Node, belief: Belief) -> Point:
         finished = point.finished | {started["id"]} if started["latched"] else point.finished

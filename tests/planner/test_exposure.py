@@ -72,14 +72,15 @@ def test_no_cheapest_policy_is_harmed_less(of: Task) -> None:
     if not 1 < world.count <= MOST_POLICIES:
         return
     harms = [world.harm(policy) for policy in world.policies()]
-    exact = Exact(of, tree_of(of), 0.0, lambda state: [])
-
-    def follow(state: State) -> Way:
-        return [(p, after[0]) for p, _, after in exact.ticked((state, (), (), ()))[1]]
-
-    own = world.harm(follow)
+    own = world.harm(ways(of, tree_of(of)))
     assert min(harms) - 1e-6 <= own <= max(harms) + 1e-6
     assert own >= max(harms) - 1e-6 or max(harms) - min(harms) <= SLIGHT + 1e-6
+
+
+def ways(of: Task, root: Node) -> Callable[[State], Way]:
+    """Where a tree leads from each state."""
+    exact = Exact(of, root, 0.0, lambda state: [])
+    return lambda state: [(p, after[0]) for p, _, after in exact.ticked((state, (), (), ()))[1]]
 
 
 class World:

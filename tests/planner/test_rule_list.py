@@ -20,6 +20,7 @@ from tests.disturbance.reference import State, best_chances, outcomes_in
 from tests.domains.problems import Problem, plan_of
 from tests.long_form import amount
 from tests.planner.errands import errand, errands
+from tests.planner.test_exposure import World, ways
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.replay.reference import Ticking, value_of
@@ -46,8 +47,9 @@ def test_trees_have_no_more_rules_than_they_need(problem: str, most: int) -> Non
     assert size(plan_of(Problem(domain, name), "auto").tree.root) <= most
 
 
-@examples(amount(60, 2000))
+@examples(amount(40, 1000))
 @given(of=errands())
+@example(of=errand(6816))  # one of two ways that cost the same is harder to bar
 @example(of=errand(94))  # to go from p2 to p1 is the only way from one state, and a circle in another
 def test_without_any_rule_something_goes_wrong(of: Task) -> None:
     root = tree_of(of)
@@ -61,7 +63,15 @@ def test_without_any_rule_something_goes_wrong(of: Task) -> None:
         if not any(world.chances[state] for state in there):
             deciding = without(deciding, node.id)  # it waits for others
     for node in actions_of(deciding):
-        assert world.fault(without(deciding, node.id)) is not None, f"{node.action} is not needed"
+        rest = without(deciding, node.id)
+        needed = world.fault(rest) is not None or exposed_more(of, rest, deciding)
+        assert needed, f"{node.action} is not needed"
+
+
+def exposed_more(of: Task, one: Node, other: Node) -> bool:
+    """Do others' changes harm the runs of one tree more (``test_exposure.py``)?"""
+    world = World(of)
+    return world.count > 1 and world.harm(ways(of, one)) < world.harm(ways(of, other)) - 1e-6
 
 
 def tree_of(of: Task) -> Node:

@@ -74,6 +74,37 @@ WINGS = """
   (:goal (have)))
 """
 
+WARD = """(define (domain ward) (:predicates (ill) (fresh) (treated) (well))
+  (:action test :precondition (and (fresh) (not (treated))) :effect (not (fresh))
+    :observe (probabilistic 0.85 (ill)) :repeats)
+  (:action flip :precondition (not (fresh))
+    :effect (and (fresh) (when (ill) (not (ill))) (when (not (ill)) (ill))))
+  (:action give :precondition (not (treated)) :effect (and (treated) (when (ill) (well))))
+  (:action spare :precondition (not (treated)) :effect (and (treated) (when (not (ill)) (well)))))
+(define (problem p) (:domain ward) (:init (fresh) (unknown (ill))) (:goal (believed (well) 0.95)))"""
+"""Readings that stay, and a goal that is believed."""
+BOXES = """(define (domain boxes) (:types box)
+  (:predicates (in ?b - box) (have)) (:observables (seen ?b - box))
+  (:action shake)
+  (:action take :parameters (?b - box) :precondition (believed (in ?b) 0.9)
+    :effect (when (in ?b) (have)))
+  (:observation there :parameters (?b - box) :condition (in ?b)
+    :distribution (probabilistic 0.9 (seen ?b) 0.1 (not (seen ?b))))
+  (:observation gone :parameters (?b - box) :condition (not (in ?b))
+    :distribution (probabilistic 0.1 (seen ?b) 0.9 (not (seen ?b)))))
+(define (problem p) (:domain boxes) (:objects left right - box)
+  (:init-belief (joint 0.5 (and (in left) (not (in right)))) (joint 0.5 (and (not (in left)) (in right))))
+  (:goal (have)))"""
+"""A model of observation after every action, and preconditions on what is believed."""
+CLINIC = """(define (domain clinic) (:types illness)
+  (:predicates (cured) (ill ?i - illness) (stain ?i - illness))
+  (:variable disease (cured) (forall (?i - illness) (ill ?i)))
+  (:obs-variable (result ?i - illness) (stain ?i))
+  (:action treat :parameters (?i - illness) :precondition (ill ?i) :effect (cured))
+  (:action test :sensing-model (forall (?i - illness) (when (ill ?i) (stain ?i)))))
+(define (problem p) (:domain clinic) (:objects flu cold cough - illness) (:init) (:goal (cured)))"""
+"""A variable of several values, and a model of sensing."""
+
 HAND_MADE = {
     "search": (search(3), Fraction(1)),
     "noisy search": (search(2, HALF), Fraction(9, 10)),
@@ -81,6 +112,9 @@ HAND_MADE = {
     "counted tiger": (tiger(ACCURACY), Fraction(9, 10)),
     "told first": (first_told(search(3)), Fraction(1)),
     "wings": (compiled(WINGS), Fraction(1)),
+    "ward": (compiled(WARD), HALF),
+    "boxes": (compiled(BOXES), HALF),
+    "clinic": (compiled(CLINIC), HALF),
 }
 
 

@@ -271,9 +271,56 @@ SECTIONS: dict[str, ast.Section] = {
         "axiom", (group("?x", "t"),), atom("p ?x"), atom("q ?x"), S
     ),
     "(:axiom (p ?x) (q ?x))": ast.Derived("derived", (group("?x"),), atom("p ?x"), atom("q ?x"), S),
-    "(:sensor s :parameters (?x) :condition (p ?x) :sensed (q ?x))": ast.Sensor(
-        name("s"), (group("?x"),), atom("p ?x"), atom("q ?x"), S
+    "(:axiom a :parameters (?x) :body (q ?x) :head (and (p ?x) (r)))": ast.Derived(
+        "axiom", (group("?x"),), atom("p ?x"), atom("q ?x"), S, name("a"), (atom("r"),)
     ),
+    "(:sensor s :parameters (?x) :condition (p ?x) :sensed (q ?x))": ast.Sensor(
+        name("s"), (group("?x"),), atom("p ?x"), ast.Observation(atom("q ?x"), S), S
+    ),
+    "(:sensor s :sense (p) (q))": ast.Sensor(
+        name("s"), (), None, ast.Observation(ast.And((atom("p"), atom("q")), S), S), S
+    ),
+    "(:sensor s :sensed (probabilistic 0.9 (p)) :repeats)": ast.Sensor(
+        name("s"),
+        (),
+        None,
+        ast.Observation(ast.Probabilistic((ast.Branch(number("0.9"), true("p"), S),), S), S),
+        S,
+        repeats=True,
+    ),
+    "(:variable v (p) (forall (?x - t) (q ?x)))": ast.StateVariable(
+        "variable",
+        name("v"),
+        None,
+        (atom("p"), ast.Quantified("forall", (group("?x", "t"),), atom("q ?x"), S)),
+        S,
+    ),
+    "(:obs-variable (v ?x - t) (p ?x))": ast.StateVariable(
+        "obs-variable", name("v"), (group("?x", "t"),), (atom("p ?x"),), S
+    ),
+    "(:observable (p) (q))": ast.AtomList("observable", (atom("p"), atom("q")), S),
+    "(:observables (o ?x))": ast.Observables(
+        "observables", (ast.PredicateDeclaration(name("o"), (group("?x"),), False, S),), S
+    ),
+    "(:observation n :condition (p) :distribution (probabilistic 0.9 (o)))": ast.ObservationModel(
+        name("n"),
+        (),
+        atom("p"),
+        ast.Probabilistic((ast.Branch(number("0.9"), true("o"), S),), S),
+        S,
+    ),
+    "(:init-belief (prob (p a) 0.3) (joint 1/2 (and (p) (not (q)))))": ast.InitBelief(
+        (
+            ast.FactBelief(atom("p a"), number("0.3"), S),
+            ast.JointBelief(number("1/2"), ast.And((atom("p"), ast.Not(atom("q"), S)), S), S),
+        ),
+        S,
+    ),
+    "(:goal (believed (or (p) (q)) 0.95))": ast.Goal(
+        ast.Believed(ast.Or((atom("p"), atom("q")), S), number("0.95"), S), S
+    ),
+    "(:sticky (p))": ast.AtomList("sticky", (atom("p"),), S),
+    "(:default-sensing-model (when (p) (q)))": ast.DefaultSensing(ast.When(atom("p"), true("q"), S), S),
     "(:domain d)": ast.DomainReference(name("d"), S),
     "(:init)": ast.Init((), S),
     "(:hidden (p a) (not (q)))": ast.Hidden((true("p a"), false("q")), S),

@@ -77,6 +77,8 @@ def _formula(inner: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
         build(ast.Or, tuples(inner)),
         build(ast.Imply, inner, inner),
         build(ast.Quantified, st.sampled_from(["exists", "forall"]), typed_lists(parameters), inner),
+        build(ast.Believed, inner, numbers),
+        build(ast.Test, st.sampled_from(["unknown", "known"]), build(ast.Believed, inner, numbers)),
     )
 
 
@@ -139,7 +141,10 @@ initial = st.recursive(
         choices.filter(lambda choice: not isinstance(choice, ast.EffectAnd)),
         clauses,
         build(ast.FluentValue, fluents, numbers),
-        build(ast.Invariant, tuples(formulas, 1)),
+        st.builds(
+            lambda parts, word: ast.Invariant(parts, S, word),
+            *(tuples(formulas, 1), st.sampled_from(["invariant", "at-least-one"])),
+        ),
         st.just(ast.Unsupported("timed initial literal", "(at 5 (p a))", S)),
     ),
     lambda inner: build(ast.InitAnd, tuples(inner)),
@@ -163,6 +168,15 @@ observations = st.one_of(formulas, _chance(effects)).map(lambda content: ast.Obs
 def _derived(parameters: ast.TypedList, head: ast.Name, condition: ast.Formula) -> ast.Derived:
     args = tuple(name for group in parameters for name in group.names)
     return ast.Derived("derived", parameters, ast.Atom(head, args, S), condition, S)
+
+
+_values = st.one_of(atoms, build(ast.Quantified, st.just("forall"), typed_lists(parameters), atoms))
+
+
+_models = st.builds(
+    lambda effect, word: ast.SensingModel(effect, S, word),
+    *(effects, st.sampled_from(["sensing-model", "observation"])),
+)
 
 
 def optional(strategy: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
@@ -190,20 +204,47 @@ sections = st.one_of(
         ast.Functions,
         tuples(build(ast.FunctionDeclaration, names, typed_lists(variables), tuples(names, 0, 1))),
     ),
-    build(
-        ast.Action,
+    st.builds(
+        lambda *fields: ast.Action(*fields[:-1], S, fields[-1]),  # type: ignore[call-arg]
         names,
         typed_lists(parameters),
         optional(formulas),
-        optional(observations),
+        optional(st.one_of(observations, _models)),
         optional(effects),
+        st.booleans(),
     ),
     build(
         ast.Template, _template_names, typed_lists(parameters), optional(formulas), optional(effects), bodies
     ),
-    build(ast.Sensor, names, typed_lists(parameters), optional(formulas), formulas),
+    st.builds(
+        lambda *fields: ast.Sensor(*fields[:-1], S, fields[-1]),  # type: ignore[call-arg]
+        *(names, typed_lists(parameters), optional(formulas), observations, st.booleans()),
+    ),
     st.builds(_derived, typed_lists(parameters), names, formulas),
     build(ast.Derived, st.just("axiom"), typed_lists(parameters), atoms, formulas),
+    st.builds(
+        lambda *fields: ast.Derived("axiom", *fields[:-2], S, *fields[-2:]),  # type: ignore[call-arg]
+        *(typed_lists(parameters), atoms, formulas, names, tuples(atoms, 0, 2)),
+    ),
+    build(
+        ast.StateVariable,
+        st.sampled_from(["variable", "obs-variable"]),
+        names,
+        optional(typed_lists(parameters)),
+        tuples(_values),
+    ),
+    build(ast.AtomList, st.sampled_from(["observable", "sticky"]), tuples(_values)),
+    build(ast.DefaultSensing, effects),
+    build(ast.ObservationModel, names, typed_lists(parameters), optional(formulas), effects),
+    build(
+        ast.InitBelief,
+        tuples(st.one_of(build(ast.FactBelief, atoms, numbers), build(ast.JointBelief, numbers, formulas))),
+    ),
+    build(
+        ast.Observables,
+        st.sampled_from(["observables", "observations"]),
+        tuples(build(ast.PredicateDeclaration, names, typed_lists(variables), st.just(False))),
+    ),
     build(ast.DomainReference, names),
     build(ast.Init, tuples(initial, 0, 5)),
     build(ast.Hidden, tuples(facts.filter(lambda fact: fact.value is not Truth.UNKNOWN))),

@@ -172,7 +172,13 @@ def run_planner(
     limit nor a signal keeps the tree from being written."""
     from bbtc.artefacts.numbers import exact
     from bbtc.cli.bounds_report import bounds_lines, dead_end_lines
-    from bbtc.cli.wording import plan_summary, refinement_line, simplified_line
+    from bbtc.cli.wording import (
+        plan_summary,
+        refinement_line,
+        rerolled_note,
+        simplified_line,
+        worst_world_line,
+    )
     from bbtc.ground.describe import describe
     from bbtc.pipeline import plan_task
     from bbtc.planner.options import DEFAULTS
@@ -223,6 +229,8 @@ def run_planner(
     lines = [
         *made,
         *plan_summary(plan, most),
+        *worst_world_line(plan.figures),
+        *(f"readings {note}" for note in rerolled_note(plan.rerolled)),
         *bounds_lines(plan.tree, most),
         *dead_end_lines(plan.tree, ends, most),
     ]

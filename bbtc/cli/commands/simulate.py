@@ -77,10 +77,11 @@ def command(
     TREE carries along the actions that it uses. With a DOMAIN and PROBLEM, or a compiled TASK, that is
     what it is run in: then its other actions count, too, for what can change.
     """
+    from bbtc.belief.rerolled import rerolled
     from bbtc.belief.scenarios import sample
     from bbtc.belief.scenarios import scenarios as listing
-    from bbtc.cli.wording import failing_lines, figures_report
-    from bbtc.pipeline import simulate_tree
+    from bbtc.cli.wording import failing_lines, figures_report, rerolled_note
+    from bbtc.pipeline import simulate_tree, with_worst_world
     from bbtc.planner.failing_runs import failing_runs
     from bbtc.printable import printable
 
@@ -88,6 +89,7 @@ def command(
     loaded = _tree(session, tree, others)
     limits = session.limits
     figures, chain = simulate_tree(loaded, limits)
+    figures = with_worst_world(loaded, figures, limits)
     session.clear()
     listed, stop = _until_limit(itertools.islice(listing(chain, limits), scenarios))
     failed, stop_failing = _until_limit(failing_runs(loaded, chain, limits, failing))
@@ -105,10 +107,13 @@ def command(
 
         data = figures_to_json(loaded, figures, listed, sampled) | disturbed.data
         data["failing_runs"] = [failing_run_to_json(loaded, each) for each in failed]
+        again = rerolled(loaded.task, chain)
+        data |= {"rerolled": list(again)} if again else {}
         data["other_failing_runs"] = figure_text(rest)
         session.write(output, dumps(data))
     else:
         lines = figures_report(loaded, figures)
+        lines += [f"readings  {note}" for note in rerolled_note(rerolled(loaded.task, chain))]
         if sampled is not None:
             share = sampled.successes / sampled.samples
             lines.append(f"sampled   {share:.6g} of {sampled.samples} runs succeed (seed {sampled.seed})")

@@ -9,8 +9,9 @@ from fractions import Fraction
 from bbtc.collector import collector_paused
 from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground import task as gt
-from bbtc.ground.condition import FALSE, TRUE, Condition, Is, compile_condition, variables
+from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, compile_condition, variables
 from bbtc.ground.hidden.changes import Local, act, divided, join, read_after, telling
+from bbtc.ground.hidden.failing import may_fail
 from bbtc.ground.hidden.groups import Groups
 from bbtc.ground.hidden.knowledge import KnownConditions, TooManyCases
 from bbtc.ground.hidden.naming import formula_names
@@ -20,10 +21,11 @@ from bbtc.ground.hidden.relevance import relevant
 from bbtc.ground.hidden.uncertain import hidden_facts
 from bbtc.ground.hidden.worlds import TooManyWorlds, Worlds, given_true
 from bbtc.ground.renumber import reordered
-from bbtc.ground.start import MOST_WORLDS, contradicted
+from bbtc.ground.start import contradicted
 from bbtc.kleene import Truth
-from bbtc.limits import Limits
+from bbtc.limits import MOST_WORLDS, Limits
 from bbtc.model import domain as md
+from bbtc.rounding import short_text
 from bbtc.source import Span
 
 _MOST_NAMED = 4
@@ -33,6 +35,8 @@ def hidden_task(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """The task of a model with hidden state. Raises as :func:`bbtc.ground.instantiate.ground` does."""
     with collector_paused():
         found = physical(model, report, limits)
+        if model.may_fail:
+            found = may_fail(found)
         return _Compiler(model, found, report, limits).task()
 
 
@@ -74,6 +78,10 @@ class _Compiler:
             self._groups.join(draw.variables)
         for condition, _ in self._clauses:
             self._groups.join(variables(condition))
+        self._thresholds = dict(self._asked_beliefs())
+        report.raise_errors()
+        for condition, _ in self._thresholds.values():
+            self._groups.join(variables(condition))
         self._told_first = list(self._at_first())
         self._draws_of: dict[int, list[Draw]] = {}
         self._clauses_of: dict[int, list[tuple[Condition, Span | None]]] = {}
@@ -90,6 +98,22 @@ class _Compiler:
                     self._model.schemas[name].observe_span,
                     "say in `:init` what is not known, as `(unknown (p))` or `(oneof …)`",
                 )
+
+    def _asked_beliefs(self) -> Iterator[tuple[int, tuple[Condition, Fraction]]]:
+        """The thresholds that matter. What they ask has to be hidden."""
+        for number, (condition, at_least) in self._found.thresholds.items():
+            if number not in self._kept:
+                continue
+            every = self._found.task.variables
+            seen = [every[each].name for each in variables(condition) if each not in self._hidden]
+            if seen:
+                self._report.error(
+                    "BBT0420",
+                    f"`believed` is about hidden facts, and {seen[0]} is seen",
+                    self._model.thresholds[every[number].predicate].span,
+                    "ask for what is seen in a condition of its own",
+                )
+            yield number, (condition, at_least)
 
     def _at_first(self) -> Iterator[gt.Observation]:
         """What sensors tell at the start; whether they do, as far as that is seen, is settled."""
@@ -148,6 +172,9 @@ class _Compiler:
         components = [self._component(each, read.knowledge, asked) for each in facts.values()]
         self._report.raise_errors()
         values = [*self._found.start, *[Truth.UNKNOWN] * len(read.knowledge.formulas)]
+        for number, (condition, _) in self._thresholds.items():
+            if isinstance(condition, Constant):
+                values[number] = Truth.of(condition == TRUE)
         for component in components:
             for variable, value in _known_at_first(component):
                 values[variable] = value
@@ -245,14 +272,26 @@ class _Compiler:
         declared = self._model.predicates
         made = [
             replace(
-                variable,
+                self._named(number, variable),
                 three_valued=number in self._hidden or declared[variable.predicate].declared_three_valued,
-                hidden=number in self._hidden,
+                hidden=number in self._hidden or number in self._thresholds,
             )
             for number, variable in enumerate(self._found.task.variables)
         ]
         names = formula_names(made, list(knowledge.formulas))
         return (*made, *(gt.Variable(name, (), three_valued=True, hidden=True) for name in names))
+
+    def _named(self, number: int, variable: gt.Variable) -> gt.Variable:
+        """The variable; one that stands for what is believed under a name for people."""
+        threshold = self._model.thresholds.get(variable.predicate)
+        if threshold is None or number not in self._thresholds:
+            return variable
+        called = f"believed-{threshold.called}"
+        if threshold.called == "formula":
+            called += f"-{list(self._model.thresholds).index(variable.predicate) + 1}"
+        called = gt.unused_name(called, self._model.predicates)
+        args = (*variable.args, short_text(threshold.at_least))
+        return replace(variable, predicate=called, args=args)
 
     def _component(self, facts: Sequence[int], knowledge: KnownConditions, asked: set[int]) -> gt.Component:
         self._limits.check_time("listing worlds")
@@ -285,6 +324,12 @@ class _Compiler:
             for formula, number in knowledge.formulas.items()
             if mine.issuperset(variables(formula)) and number in asked
         ]
+        known += [
+            gt.Knowledge(number, local.condition(condition), at_least)
+            for number, (condition, at_least) in self._thresholds.items()
+            if number in asked and not isinstance(condition, Constant)
+            if mine.issuperset(variables(condition))
+        ]
         first = tuple(map(local.observation, self._first_of.get(leader, ())))
         return gt.Component(tuple(names), tuple(prior.items()), tuple(known), first, tuple(local.seen))
 
@@ -301,13 +346,16 @@ def _odds(draws: Iterable[Draw]) -> Iterator[tuple[int, Fraction]]:
 def _known_at_first(component: gt.Component) -> Iterator[tuple[int, Truth]]:
     """What the prior tells."""
     worlds = [
-        bytes(2 * (world >> place & 1) for place in range(len(component.facts)))
-        for world, _ in component.prior
+        (bytes(2 * (world >> place & 1) for place in range(len(component.facts))), probability)
+        for world, probability in component.prior
     ]
     for each in component.known:
         value = compile_condition(each.condition)
-        found = {value(world) for world in worlds}
-        yield each.variable, Truth(found.pop()) if len(found) == 1 else Truth.UNKNOWN
+        chance = sum((p for world, p in worlds if value(world) == Truth.TRUE), Fraction(0))
+        if chance >= each.at_least:
+            yield each.variable, Truth.TRUE
+        else:
+            yield each.variable, Truth.FALSE if 1 - chance >= each.at_least else Truth.UNKNOWN
 
 
 def _asked(task: gt.Task) -> Iterator[int]:

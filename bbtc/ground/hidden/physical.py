@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, Known, replaced, variables
-from bbtc.ground.lower import Frame, Lowered, Lowering, extend
+from bbtc.ground.hidden.repeats import Keeping, Kept
+from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normal_form
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.refused import noise
@@ -53,6 +54,8 @@ class Physical:
     uncertain: frozenset[int]
     observed: frozenset[int]
     """The facts that are declared as always seen: ``first`` and ``readings`` tell them."""
+    thresholds: Mapping[int, tuple[Condition, Fraction]]
+    """By variable that stands for what is believed: the condition, and how probable it has to be."""
     read: Mapping[str, frozenset[int]]
     """By schema: what the ``:observe`` of its actions tells of."""
 
@@ -69,17 +72,23 @@ def physical(model: md.Model, report: Report, limits: Limits) -> Physical:
     assert begin.prior is not None
     atoms = Atoms(reached)
     builder = TaskBuilder(atoms, report, begin, limits)
-    readings: dict[str, list[gt.Observation]] = {}
+    readings: dict[str, list[_Reading]] = {}
     for schema, rows in zip(model.schemas.values(), reached.actions, strict=True):
-        if schema.observe is not None:
+        if schema.tells:
             limits.check_time("grounding")
             frame = Frame(atoms.universe, schema.parameters)
-            told = _told(builder.lowering, schema.observe, frame)
+            told = [] if schema.observe is None else _told(builder.lowering, schema.observe, frame)
+            besides = [_besides(builder.lowering, each, frame) for each in schema.told]
             for row in rows:
                 env = frame.env(row)
                 made = [gt.Observation(condition(env), accuracy) for condition, accuracy in told]
-                made = [each for each in made if not isinstance(each.condition, Constant)]
-                readings[gt.ground_name(schema.name, atoms.universe.args(row))] = made
+                made += [observed(env) for observed in besides]
+                made = [
+                    each for each in made if not isinstance(each.condition, Constant) and each.when != FALSE
+                ]
+                args = atoms.universe.args(row)
+                source = (schema.name, args) if schema.repeats else None
+                readings[gt.ground_name(schema.name, args)] = [_Reading(each, source) for each in made]
     clauses = [
         Clause(builder.lowering.ground(part), clause.span or part.span)
         for clause in begin.prior.clauses
@@ -92,14 +101,35 @@ def physical(model: md.Model, report: Report, limits: Limits) -> Physical:
     sensors = list(_sensed(builder.lowering, model.sensors, limits))
     for name, predicate in model.predicates.items():
         if predicate.observed:
-            sensors += [gt.Observation(Is(number, Truth.TRUE)) for number in atoms.numbers[name].values()]
+            numbers = atoms.numbers[name].values()
+            sensors += [_Reading(gt.Observation(Is(number, Truth.TRUE))) for number in numbers]
+    thresholds = {}
+    for name, threshold in model.thresholds.items():
+        frame = Frame(atoms.universe, threshold.parameters)
+        believed = builder.lowering.condition(normal_form(threshold.condition), frame)
+        for row, number in list(atoms.numbers[name].items()):
+            thresholds[number] = believed(frame.env(row)), threshold.at_least
     task = builder.task(reached.actions)
     return _numbered(
-        task, readings=readings, sensors=sensors, prior=begin.prior, clauses=clauses, atoms=atoms
+        task,
+        readings=readings,
+        sensors=sensors,
+        prior=begin.prior,
+        clauses=clauses,
+        atoms=atoms,
+        thresholds=thresholds,
     )
 
 
-def _sensed(lowering: Lowering, sensors: Iterable[md.Sensor], limits: Limits) -> Iterator[gt.Observation]:
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """An observation, and of one that is kept what makes it, by name and arguments."""
+
+    observation: gt.Observation
+    source: tuple[str, tuple[str, ...]] | None = None
+
+
+def _sensed(lowering: Lowering, sensors: Iterable[md.Sensor], limits: Limits) -> Iterator[_Reading]:
     """What each sensor tells, and when."""
     universe = lowering.universe
     for sensor in sensors:
@@ -108,6 +138,7 @@ def _sensed(lowering: Lowering, sensors: Iterable[md.Sensor], limits: Limits) ->
         when = lowering.condition(sensor.condition, frame)
         told = _told(lowering, sensor.sensed, frame)
         loops = [(frame.slot(p.name), universe.members(p.types)) for p in sensor.parameters]
+        slots = [slot for slot, _ in loops]
         for env in extend(frame.env([-1] * len(loops)), loops, lowering.spend):
             condition = when(env)
             if condition == FALSE:
@@ -115,7 +146,21 @@ def _sensed(lowering: Lowering, sensors: Iterable[md.Sensor], limits: Limits) ->
             for sensed, accuracy in told:
                 found = sensed(env)
                 if not isinstance(found, Constant):
-                    yield gt.Observation(found, accuracy, None if condition == TRUE else condition)
+                    made = gt.Observation(found, accuracy, None if condition == TRUE else condition)
+                    args = universe.args(tuple(env[slot] for slot in slots))
+                    yield _Reading(made, (sensor.name, args) if sensor.repeats else None)
+
+
+def _besides(lowering: Lowering, reading: md.Reading, frame: Frame) -> Callable[[Env], gt.Observation]:
+    """A reading as an observation, in each environment."""
+    condition = lowering.condition(normal_form(reading.condition), frame)
+    when = lowering.condition(normal_form(reading.when), frame)
+
+    def observation(env: Env) -> gt.Observation:
+        guard = when(env)
+        return gt.Observation(condition(env), reading.accuracy, None if guard == TRUE else guard)
+
+    return observation
 
 
 def _told(
@@ -133,11 +178,12 @@ def _told(
 def _numbered(
     task: gt.Task,
     *,
-    readings: Mapping[str, list[gt.Observation]],
-    sensors: list[gt.Observation],
+    readings: Mapping[str, list[_Reading]],
+    sensors: list[_Reading],
     prior: Prior,
     clauses: list[Clause],
     atoms: Atoms,
+    thresholds: Mapping[int, tuple[Condition, Fraction]],
 ) -> Physical:
     """All of it over the variables of the task, which may have another order than those of the atoms."""
     renumber = {old: new for new, old in enumerate(atoms.order())}
@@ -157,36 +203,76 @@ def _numbered(
         )
         for draw in prior.draws
     ]
-    uncertain = frozenset(map(variable, prior.atoms))
+    asked = {renumber[number]: (replaced(c, leaf), q) for number, (c, q) in thresholds.items()}
+    uncertain = frozenset(map(variable, prior.atoms)) - asked.keys()
     observed = {name for name, predicate in atoms.model.predicates.items() if predicate.observed}
     (first, *_) = task.initial
     values = tuple(
-        Truth.UNKNOWN if number in uncertain else value for number, value in enumerate(first.values)
+        Truth.UNKNOWN if number in uncertain or number in asked else value
+        for number, value in enumerate(first.values)
     )
 
-    def observation(made: gt.Observation) -> gt.Observation:
-        when = None if made.when is None else replaced(made.when, leaf)
-        return replace(made, condition=replaced(made.condition, leaf), when=when)
+    keeping = Keeping(task)
 
-    read: dict[str, set[int]] = {}
-    for action in task.actions:
-        if action.name in readings:
-            of = read.setdefault(action.schema, set())
-            of.update(renumber[each] for told in readings[action.name] for each in variables(told.condition))
+    def observation(reading: _Reading) -> gt.Observation:
+        made = reading.observation
+        when = None if made.when is None else replaced(made.when, leaf)
+        told = replaced(made.condition, leaf)
+        if reading.source is None or made.accuracy in (0, 1):
+            return replace(made, condition=told, when=when)
+        return gt.Observation(keeping.told(Kept(told, made.accuracy, *reading.source)), when=when)
+
     told_first = [observation(each) for each in sensors]
     of_sensors = _after_actions(task, told_first)
-    return Physical(
+    told_after = {
+        action.name: (*map(observation, readings.get(action.name, ())), *of_sensors[action.name])
+        for action in task.actions
+    }
+    found = Physical(
         replace(task, initial=(gt.InitialState(Fraction(1), values),)),
-        {
-            action.name: (*map(observation, readings.get(action.name, ())), *of_sensors[action.name])
-            for action in task.actions
-        },
+        told_after,
         tuple(told_first),
         tuple(draws),
         tuple(Clause(replaced(each.condition, leaf), each.span) for each in clauses),
         uncertain,
         frozenset(number for number, each in enumerate(task.variables) if each.predicate in observed),
-        {schema: frozenset(numbers) for schema, numbers in read.items()},
+        asked,
+        _read(task, readings, renumber),
+    )
+    return _with_kept(found, keeping) if keeping.facts else found
+
+
+def _read(
+    task: gt.Task, readings: Mapping[str, list[_Reading]], renumber: Mapping[int, int]
+) -> dict[str, frozenset[int]]:
+    """By schema: what its actions tell of."""
+    read: dict[str, set[int]] = {}
+    for action in task.actions:
+        if action.name in readings:
+            of = read.setdefault(action.schema, set())
+            told = (reading.observation.condition for reading in readings[action.name])
+            of.update(renumber[each] for condition in told for each in variables(condition))
+    return {schema: frozenset(numbers) for schema, numbers in read.items()}
+
+
+def _with_kept(found: Physical, keeping: Keeping) -> Physical:
+    """With the facts that readings are wrong that are kept: drawn at the start, and where actions say so."""
+    more = [variable for variable, _ in keeping.facts]
+    start = gt.InitialState(Fraction(1), (*found.start, *[Truth.UNKNOWN] * len(more)))
+    draws = (
+        Draw((number,), ((1 - wrong, frozenset()), (wrong, frozenset([number]))))
+        for number, wrong in keeping.odds().items()
+    )
+    return replace(
+        found,
+        task=replace(
+            found.task,
+            variables=(*found.task.variables, *more),
+            initial=(start,),
+            actions=keeping.actions(),
+        ),
+        draws=(*found.draws, *draws),
+        uncertain=found.uncertain.union(keeping.odds()),
     )
 
 

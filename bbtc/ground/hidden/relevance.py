@@ -51,6 +51,8 @@ def relevant(physical: Physical, hidden: frozenset[int]) -> tuple[set[int], set[
             leads.setdefault(("variable", variable), set()).update(others)
     for together in _of_start(physical):
         _couple(leads, together)
+    for variable, (condition, _) in physical.thresholds.items():
+        leads.setdefault(("variable", variable), set()).update(_nodes(condition))
     _tell(physical, hidden, leads)
     for template in physical.task.templates:
         start.update(_of_template(physical.task, template))

@@ -20,9 +20,8 @@ from bbtc.ground.condition import (
     variables,
 )
 from bbtc.ground.hidden.physical import Draw
-from bbtc.ground.start import MOST_WORLDS
 from bbtc.kleene import Truth
-from bbtc.limits import Limits
+from bbtc.limits import MOST_WORLDS, Limits
 
 _MOST_STEPS = 100 * MOST_WORLDS
 

@@ -19,7 +19,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from bbtc.ground.normal import Block, Group, conjuncts, disjuncts, free, groups, normal_form
+from bbtc.ground.normal import Block, Group, conjuncts, disjuncts, groups, normal_form
 from bbtc.ground.reachability.usage import Usage, called
 from bbtc.ground.universe import Universe
 from bbtc.kleene import Truth
@@ -139,7 +139,7 @@ class ProgramBuilder:
         self._bound(block, self._count(parameters))
         precondition = list(conjuncts(normal_form(schema.precondition)))
         found = list(all_groups(block))
-        kept = schema.name in self._called or schema.observe is not None
+        kept = schema.name in self._called or schema.tells
         if not kept and len(found) == 1 and not found[0].parameters:
             # Nothing happens where the only guard is false: it may as well be a precondition.
             precondition += found[0].guard
@@ -218,14 +218,14 @@ class ProgramBuilder:
             self._rule(candidate, body)
             body = [candidate]
             for part in far:
-                body = self._with(part, body, self._named([candidate], free(part)))
+                body = self._with(part, body, self._named([candidate], mf.free(part)))
         if body is not None:
             yield body
 
     def _near(self, parameters: tuple[Parameter, ...], simple: list[mf.Formula]) -> list[str]:
         """A context for parts that read some parameters: these, and the atoms that hold of nothing else."""
         names = {parameter.name for parameter in parameters}
-        atoms = [each for each in simple if isinstance(each, mf.Atom) and names.issuperset(free(each))]
+        atoms = [each for each in simple if isinstance(each, mf.Atom) and names.issuperset(mf.free(each))]
         context = self._conjunction(atoms, self._typed(parameters, atoms))
         assert context is not None
         return self._named(context, names) if len(context) > 1 else context
@@ -348,7 +348,7 @@ class ProgramBuilder:
         return "not " + self._call(f"n{self.number[predicate]}", args)
 
     def _any(self, parts: Iterable[mf.Formula], whole: mf.Formula, context: list[str]) -> str:
-        head = _written(self._fresh(), map(_variable, free(whole)))
+        head = _written(self._fresh(), map(_variable, mf.free(whole)))
         for part in parts:
             body = self._conjunction(conjuncts(part), context)
             if body is not None:
@@ -369,7 +369,7 @@ class ProgramBuilder:
             return
         # A chain: step n holds if the condition can hold for the first n objects.
         order, name = self._order(parameter.types), self._fresh()
-        variables = [_variable(each) for each in free(part) if each != parameter.name]
+        variables = [_variable(each) for each in mf.free(part) if each != parameter.name]
         self._rule(_written(name, ["0", *variables]), context)
         step = f"N{name}"
         inside = [*context, _written(name, [step, *variables])]
@@ -473,7 +473,7 @@ def _shows(leaf: me.Set | me.Add) -> bool:
 
 def _read(part: mf.Formula, scope: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
     """The parameters that a part reads."""
-    names = free(part)
+    names = mf.free(part)
     return tuple(parameter for parameter in scope if parameter.name in names)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,18 @@ from bbtc.planner.mdp.transitions import Draw, Index
 
 Number: TypeAlias = npt.NDArray[np.int32]
 """Numbers of states or choices."""
+
+
+_FEW = 16  # states whose successors are found one by one
+_MOST_LISTED = 200_000  # edges
+
+
+class _Lists(NamedTuple):
+    """Where the choices of each state begin, where the edges of each choice begin, and where edges lead."""
+
+    choices: list[int]
+    edges: list[int]
+    successor: list[int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,6 +44,8 @@ class Branching:
     edge_successor: Number
     _choice_first: Index = field(init=False, repr=False)
     _edge_first: Index = field(init=False, repr=False)
+    _lists: list[_Lists] = field(init=False, repr=False, default_factory=list)
+    """What :meth:`closure` reads, once it was called; at most one."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_choice_first", _firsts(self.choice_state, len(self.goal)))
@@ -67,9 +81,23 @@ class Branching:
         while len(frontier):
             seen[frontier] = True
             found.append(frontier)
-            after = self.successors(frontier, taken)
+            few = len(frontier) <= _FEW and len(self.edge_choice) <= _MOST_LISTED
+            after = self._few_successors(frontier, taken) if few else self.successors(frontier, taken)
             frontier = after[~seen[after]]
         return np.concatenate([start[:0], *found])
+
+    def _few_successors(self, states: Index, taken: Flags) -> Index:
+        """The same as :meth:`successors`, faster for few states."""
+        if not self._lists:
+            ends = (self._choice_first, self._edge_first, self.edge_successor)
+            self._lists.append(_Lists(*(each.tolist() for each in ends)))
+        choices, edges, successor = self._lists[0]
+        found: set[int] = set()
+        for state in states.tolist():
+            for choice in range(choices[state], choices[state + 1]):
+                if taken[choice]:
+                    found.update(successor[edges[choice] : edges[choice + 1]])
+        return np.array(sorted(found), dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,7 +21,7 @@ from bbtc.ground.condition import Condition, Is, conjunction
 from bbtc.ground.task import Component, InitialState, Knowledge, Task, Variable, split_name
 from bbtc.kleene import Truth
 from bbtc.planner.synthesis.permissive import MultiPolicy
-from bbtc.rounding import decimal
+from bbtc.rounding import short_text
 
 _MOST_PAIRS = 2_000
 _HALF = Fraction(1, 2)
@@ -40,7 +40,7 @@ def with_beliefs(task: Task, policy: MultiPolicy) -> Task | None:
         pairs = list(dict.fromkeys(_conflicts(policy, number)))
         known, beliefs = list(component.known), beliefs_of(component)
         for name, condition, at_least in _thresholds(task, component, pairs):
-            args = (*name.args, _decimal(at_least))
+            args = (*name.args, short_text(at_least))
             variable = Variable(f"believed-{name.predicate}", args, three_valued=True)
             if any(variable.name == each.name for each in variables):
                 continue
@@ -128,10 +128,3 @@ def _shortest(low: Fraction, high: Fraction) -> Fraction:
         if found > low:
             return found
         scale *= 10
-
-
-def _decimal(value: Fraction) -> str:
-    digits = 0
-    while (value * 10**digits).denominator > 1:
-        digits += 1
-    return decimal(value, digits)
