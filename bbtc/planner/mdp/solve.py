@@ -99,15 +99,12 @@ def _of_endless(
         searched = search_bounds(task, few, target, verdict=verdict, advice=advice)
         found = Best(searched.lower, searched.bounds, searched.stop, searched.interrupted)
     if search is not None and found.stop is not None:
-        closed = closed_in(search, limits, target, verdict=verdict)
-        better = closed.bounds.lower > found.bounds.lower
-        most = min(most, found.bounds.upper, closed.bounds.upper)
-        found = Best(
-            closed.found if better else found.found,
-            closed.bounds if better else found.bounds,
-            closed.stop,
-            closed.interrupted,
-        )
+        with contextlib.suppress(LimitReached):
+            closed = closed_in(search, limits, target, verdict=verdict)
+            most = min(most, found.bounds.upper, closed.bounds.upper)
+            better = closed.bounds.lower > found.bounds.lower
+            kept = (closed.found, closed.bounds) if better else (found.found, found.bounds)
+            found = Best(*kept, closed.stop, closed.interrupted)
     bounds = Bounds(found.bounds.lower, max(found.bounds.lower, min(found.bounds.upper, most)))
     return replace(found, bounds=bounds)
 

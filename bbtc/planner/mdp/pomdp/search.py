@@ -36,6 +36,7 @@ from bbtc.planner.mdp.pomdp.processes import Choice, process
 ERROR = 1e-8
 """What rounding, and beliefs that are not told apart, may add to a bound at most."""
 
+_DOING = "the search for the best probability"
 _CLOSED = 1e-7
 _TIE = 1e-7  # actions whose bounds are closer are equally good
 _PROGRESS = 1e-3  # of the gap, by which an upper bound must fall for a new beginning
@@ -46,6 +47,7 @@ _WEIGHT = 0.02  # of the gap, that a belief must have to be visited
 _LEAST_WEIGHT = 1e-9
 _OF_ROLLOUTS = 0.05  # of that, in a rollout
 _LONGEST = 1000
+_LOOK = 16  # beliefs of a class that are visited between two looks at the clock
 _PLACES = 7  # in which figures agree that count as equal
 _DROPPED_BITS = 53 - 40
 
@@ -105,7 +107,7 @@ class Search:
     """A search on a process, whose bounds hold from the start. Raises ``LimitReached``."""
 
     def __init__(self, pomdp: Pomdp, limits: Limits) -> None:
-        self.pomdp = pomdp
+        self.pomdp, self._limits = pomdp, limits
         bounds = informed(pomdp, limits)
         self._haste = hasty(pomdp, bounds, limits)
         self._lower = [Lower(each) for each in pomdp.classes]
@@ -123,12 +125,12 @@ class Search:
     def run(self, target: Fraction | None, limits: Limits, *, verdict: bool) -> None:
         """Search until the bounds have met, or reach a target, or with ``verdict`` leave it behind. Raises
         ``LimitReached``; what was found until then stays."""
+        self._limits = limits
         share, waited = _WEIGHT, 0
         while waited < _PATIENCE and not self._done(target, verdict=verdict):
             low, high = self.bounds
-            limits.check_states(len(self._nodes), "the search for the best probability")
-            limits.check_time("the search for the best probability", len(self._nodes))
-            limits.tell("the search for the best probability", len(self._nodes), (low, high))
+            limits.check_time(_DOING, len(self._nodes))
+            limits.tell(_DOING, len(self._nodes), (low, high))
             found = self._trial(share * (high - low))
             self._rollout(_OF_ROLLOUTS * share * (high - low))
             fell = 0.0 if found else self._deflate()
@@ -164,6 +166,10 @@ class Search:
         return found
 
     def _visit(self, node: Node) -> None:
+        visited = self._visited[node.where]
+        self._limits.check_states(len(self._nodes), _DOING)
+        if len(visited) % _LOOK == 0:
+            self._limits.check_time(_DOING, len(self._nodes))
         has = node.weights > 0
         ways = []
         if node.lower < 1.0:
@@ -173,7 +179,7 @@ class Search:
                     if any(each.node is not node for each in after):
                         ways.append(Way(doing, after))
         node.ways = tuple(ways)
-        self._visited[node.where].append(node.weights)
+        visited.append(node.weights)
 
     def _after(self, node: Node, doing: Doing) -> Iterable[After]:
         for told in doing.told:

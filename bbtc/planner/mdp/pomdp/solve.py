@@ -11,6 +11,7 @@ import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import count
 
 import numpy as np
 
@@ -78,9 +79,10 @@ def _exactly(search: Search, limits: Limits) -> MaxProb:
     pomdp = search.pomdp
     explorer = Explorer(pomdp.task, limits)
     waiting: list[tuple[float, int, int, Vector]] = []
+    order = count()  # of equals, what came first
 
     def come(probability: float, state: int, vector: Vector) -> None:
-        heapq.heappush(waiting, (-probability, state, len(waiting), vector))
+        heapq.heappush(waiting, (-probability, state, next(order), vector))
 
     for p, state in explorer.initial:
         come(float(p), state, search.best(*_belief(pomdp, explorer, state)))
@@ -95,7 +97,10 @@ def _exactly(search: Search, limits: Limits) -> MaxProb:
         entered.add((state, id(vector)))
         if state not in choices:
             mark = explorer.mark()
-            explorer.expand(np.array([state]), limits)
+            try:
+                explorer.expand(np.array([state]), limits)
+            except LimitReached:
+                break
             choices[state] = explorer.since(mark)
         told = _told(pomdp, explorer, state, vector)
         edges = list(_edges(choices[state], vector.doing.action))
