@@ -35,6 +35,7 @@ Costs: TypeAlias = npt.NDArray[np.floating[Any]]
 """Guessed costs; infinite where something is impossible for sure."""
 
 _NEVER = float("inf")
+_MOST = 1e30  # what anything within reach takes, at most
 _KEPT_BYTES = 1 << 26
 _CELLS = 1 << 18  # array cells worked on at a time
 _ACTIONS_AT_ONCE = 64  # indexed between two looks at the limits
@@ -229,6 +230,8 @@ class Relaxation:
             return None
         before = costs[self._added]
         least = np.minimum(before, self._best.reduced(np.minimum, self._reached(costs)))
+        # Sums may double from step to step; what is far is not out of reach.
+        np.minimum(least, _MOST, out=least, where=np.isfinite(least))
         return least if (least < before).any() else None
 
     def _reached(self, costs: Costs) -> Costs:

@@ -269,7 +269,8 @@ class Relaxation:
                 left[operator] -= 1
                 total[operator] += spent
                 if not left[operator]:
-                    price = total[operator] + (actions[operator] >= 0)
+                    # Sums may double from step to step; what is far is not out of reach.
+                    price = min(total[operator] + (actions[operator] >= 0), _NEVER - 1)
                     for added in adds[operator]:
                         if price < cost[added]:
                             cost[added] = price
@@ -322,7 +323,8 @@ class Relaxation:
         """Enough for the goal to be out of reach in the relaxation, of a state where it is: no literal of it
         can be left out."""
         reach = _Reach(self._users, self._adds, self._counts, self.goal)
-        assert reach.add([*self.holding(state), self._always])
+        if not reach.add([*self.holding(state), self._always]):
+            raise AssertionError("not a dead end")
         kept = self.exclusion.shortest(PartialState(self._full, state & self._full))
         # What would be true without them, and makes no difference.
         kept = without(kept, ~state & self._two_valued & ~self._masks[2])
