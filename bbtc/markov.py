@@ -10,9 +10,10 @@ Gaussian elimination over rationals, the state with the fewest links first (mini
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from math import gcd
+from itertools import product
+from math import gcd, prod
 from typing import TypeAlias, TypeVar
 
 Row: TypeAlias = dict[int, Fraction]
@@ -20,6 +21,7 @@ Row: TypeAlias = dict[int, Fraction]
 
 _N = TypeVar("_N", bound=Hashable)
 _ZERO = Fraction(0)
+_ONE = Fraction(1)
 
 
 def reachable(start: Iterable[_N], successors: Callable[[_N], Iterable[_N]]) -> set[_N]:
@@ -40,6 +42,12 @@ def distribution(parts: Iterable[tuple[_N, Fraction]]) -> dict[_N, Fraction]:
     for outcome, probability in parts:
         found[outcome] = found[outcome] + probability if outcome in found else probability
     return found
+
+
+def independent(parts: Iterable[Mapping[_N, Fraction]]) -> Iterator[tuple[tuple[_N, ...], Fraction]]:
+    """One outcome of each of some independent draws, in every way, with the probability of that."""
+    for drawn in product(*(part.items() for part in parts)):
+        yield tuple(outcome for outcome, _ in drawn), prod((p for _, p in drawn), start=_ONE)
 
 
 def weighted(pairs: Iterable[tuple[Fraction, Fraction]], more: Fraction = _ZERO) -> Fraction:

@@ -30,10 +30,11 @@ from bbtc.ground.condition import (
     TRUE,
     Condition,
     Constant,
+    Is,
+    Known,
     compile_condition,
     evaluate,
     is_test,
-    leaves,
     replaced,
     variables,
 )
@@ -208,10 +209,7 @@ def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
     facts has the value that it has in the world. ``(known …)`` and ``(unknown …)`` ask what is known there,
     too."""
     read = set(variables(condition))
-    told = {
-        leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if is_test(leaf)
-    }
-    condition = replaced(condition, lambda leaf: told.get(leaf, leaf))
+    condition = _with_tests_done(condition, values)
     worlds: dict[bytes, Fraction] = {bytes(values): ONE}
     for index, component in enumerate(task.components):
         known = [each for each in component.known if each.variable in read]
@@ -228,16 +226,22 @@ def chance_of(task: Task, condition: Condition, values: Values) -> Fraction:
 def true_in_worlds(task: Task, condition: Condition, values: Values, worlds: Mapping[int, int]) -> bool:
     """Is a condition on what is known really so in a state, in these worlds, by component? As in
     :func:`chance_of`."""
-    told = {
-        leaf: Constant(evaluate(leaf, values) is Truth.TRUE) for leaf in leaves(condition) if is_test(leaf)
-    }
     real = bytearray(values)
     for index, world in worlds.items():
         component = task.components[index]
         local = local_values(component, world)
         for each in component.known:
             real[each.variable] = compile_condition(each.condition)(local)
-    return evaluate(replaced(condition, lambda leaf: told.get(leaf, leaf)), bytes(real)) is Truth.TRUE
+    return evaluate(_with_tests_done(condition, values), bytes(real)) is Truth.TRUE
+
+
+def _with_tests_done(condition: Condition, values: Values) -> Condition:
+    """A condition in which ``(known …)`` and ``(unknown …)`` are what they are in a state."""
+
+    def done(leaf: Is | Known) -> Condition:
+        return Constant(evaluate(leaf, values) is Truth.TRUE) if is_test(leaf) else leaf
+
+    return replaced(condition, done)
 
 
 def _drawn(task: Task, values: Values, index: int, known: Sequence[Knowledge]) -> dict[Delta, Fraction]:

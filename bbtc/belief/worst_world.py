@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from math import prod
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
@@ -22,7 +21,7 @@ from bbtc.ground.condition import variables
 from bbtc.ground.task import MISREAD, NO_CHANGE, ONE, ZERO, Change, Component, GroundAction, Task
 from bbtc.kleene import Truth
 from bbtc.limits import MOST_WORLDS, Limits
-from bbtc.markov import distribution
+from bbtc.markov import distribution, independent
 from bbtc.tree.nodes import Node, actions_of
 
 
@@ -87,7 +86,9 @@ class _Worlds:
         began = [
             distribution(
                 (values, p * q)
-                for worlds, p in _together([prior[each] for prior, each in zip(priors, picked, strict=True)])
+                for worlds, p in independent(
+                    [prior[each] for prior, each in zip(priors, picked, strict=True)]
+                )
                 for values, q in self._starts(worlds)
             )
             for picked in every
@@ -179,12 +180,6 @@ def _drawn_by_nobody(component: Component) -> dict[int, dict[int, Fraction]]:
         whole = sum(worlds.values())
         worlds.update({world: p / whole for world, p in worlds.items()})
     return found
-
-
-def _together(parts: Sequence[dict[int, Fraction]]) -> Iterator[tuple[tuple[int, ...], Fraction]]:
-    """One of each of some independent draws, with the probability of that."""
-    for picked in product(*(part.items() for part in parts)):
-        yield tuple(world for world, _ in picked), prod((p for _, p in picked), start=ONE)
 
 
 def _world(values: Values, place: int, facts: int) -> int:

@@ -85,10 +85,15 @@ def _of_endless(
     task: Task, limits: Limits, target: Fraction | None, advice: Advice | None, *, whole: bool, verdict: bool
 ) -> Best:
     """The same, where there may be beliefs without end."""
+    small = _small(task, limits.part(_SHARE))
+    if small is not None and small.bounds.exact is not None:
+        return small
     search = search_of(task, limits.part(_SHARE))
     most = _seeing_all(task, limits.part(_SHARE))
     most = most if search is None else min(most, highest(search))
-    found = _nearest(task, limits.part(_SHARE), None if target is None or target > most else target)
+    found = small
+    if found is None and target is not None and target <= most:
+        found = _nearest(task, limits.part(_SHARE), target)
     if found is None and whole:
         replace(limits, states=FEW_BELIEFS).check_states(FEW_BELIEFS + 1, "exploration")
     if found is None:
@@ -120,15 +125,18 @@ def _seeing_all(task: Task, limits: Limits) -> Fraction:
         return Fraction(1)
 
 
-def _nearest(task: Task, limits: Limits, target: Fraction | None) -> Best | None:
-    """All of a small space, or the least, by the number of actions, in which a policy reaches the target.
-    None where neither is within reach: with beliefs without end, P* may be what no policy attains."""
+def _small(task: Task, limits: Limits) -> Best | None:
+    """All of a small space; None where it is not small."""
     space = explore_space(task, replace(limits, states=min(limits.states, _FEW_IN_ALL)))
-    if space.complete:
-        found = max_prob(space, limits)
-        return Best(found, found.initial)
-    if target is None:
+    if not space.complete:
         return None
+    found = max_prob(space, limits)
+    return Best(found, found.initial)
+
+
+def _nearest(task: Task, limits: Limits, target: Fraction) -> Best | None:
+    """The least of the space, by the number of actions, in which a policy reaches the target. None where that
+    is not within reach: with beliefs without end, P* may be what no policy attains."""
     few = replace(limits, states=min(limits.states, FEW_BELIEFS))
     for depth in count(1):
         space = explore_space(task, few, depth)

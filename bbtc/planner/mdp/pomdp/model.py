@@ -26,9 +26,10 @@ from bbtc.belief.draws import Values, compile_factor, product_of
 from bbtc.belief.hidden import Readings, belief_in, local_values
 from bbtc.belief.state import Bounded, initial_belief
 from bbtc.ground.condition import Condition, Is, compile_condition, negation
-from bbtc.ground.task import NO_CHANGE, ONE, Observation, Task
+from bbtc.ground.task import NO_CHANGE, Observation, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.markov import independent
 from bbtc.planner.mdp.fully_observable import reads_knowledge
 from bbtc.planner.mdp.graph import Floats, sums
 from bbtc.planner.mdp.packing import Cube, Flags, Packing, bit_test, cubes
@@ -362,11 +363,10 @@ def _possible(task: Task, values: Values) -> Iterator[tuple[_World, Fraction]]:
     """The worlds that are possible in a state, with their probabilities."""
     beliefs = [belief_in(task, values, index) for index in range(len(task.components))]
     totals = [sum(weight for _, weight in belief) for belief in beliefs]
-    for drawn in product(*beliefs):
-        probability = ONE
-        for (_, weight), total in zip(drawn, totals, strict=True):
-            probability *= Fraction(weight, total)
-        yield tuple(world for world, _ in drawn), probability
+    return independent(
+        {world: Fraction(weight, total) for world, weight in belief}
+        for belief, total in zip(beliefs, totals, strict=True)
+    )
 
 
 def _dense(weights: dict[int, Fraction], worlds: int) -> Floats:
