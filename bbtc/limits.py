@@ -29,6 +29,9 @@ MOST_WORLDS = 4096
 PLANNING_SECONDS = 60.0
 """The time that planning may take unless somebody says otherwise."""
 
+_BETWEEN_LOOKS = 0.002
+"""Seconds between two looks at the memory, where time is looked at more often."""
+
 
 @dataclass(slots=True)
 class Effort:
@@ -128,7 +131,8 @@ class Limits:
             self.effort.looks -= 1
             if self.effort.looks < 0:
                 raise self.reached(f"a second opinion ended {doing}", "--time-limit")
-        self.check_memory(doing)
+        if self.memory is not None and _Lately.over(self.memory):
+            self.check_memory(doing)
 
     @property
     def memory_left(self) -> int | None:
@@ -176,6 +180,22 @@ class Limits:
     def reached(message: str, option: str) -> LimitReached:
         """The exception for a limit that ``option`` raises."""
         return LimitReached([Diagnostic("BBT0007", message, hint=f"raise it with {option}")])
+
+
+class _Lately:
+    """When the memory was looked at, and for which limit: to ask the system takes much longer than to look at
+    the clock."""
+
+    at, limit = 0.0, -1
+
+    @classmethod
+    def over(cls, limit: int) -> bool:
+        """Is it time to look again?"""
+        now = time.monotonic()
+        if limit == cls.limit and now < cls.at + _BETWEEN_LOOKS:
+            return False
+        cls.at, cls.limit = now, limit
+        return True
 
 
 def resident_memory() -> int | None:
