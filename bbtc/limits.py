@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -178,9 +179,24 @@ class Limits:
         return LimitReached([Diagnostic("BBT0007", message, hint=f"raise it with {option}")])
 
 
+_PAUSE = 0.001
+"""Seconds in which a process takes little memory, a few pages, and asking costs more than what was done."""
+
+_looked: tuple[float, int | None] = (-math.inf, None)
+"""When the system was asked last, and what it told."""
+
+
 def resident_memory() -> int | None:
-    """The bytes of this process in memory; None where the system does not tell. Without ``/proc`` it is
-    the most that they ever were."""
+    """The bytes of this process in memory, now or a thousandth of a second ago; None where the system does
+    not tell. Without ``/proc`` it is the most that they ever were."""
+    global _looked
+    now = time.monotonic()
+    if now - _looked[0] >= _PAUSE:
+        _looked = (now, _resident_memory())
+    return _looked[1]
+
+
+def _resident_memory() -> int | None:
     try:
         with open("/proc/self/statm", "rb") as file:  # noqa: PTH123 (called often)
             pages = int(file.read().split()[1])
