@@ -180,20 +180,27 @@ class Limits:
 
 
 _PAUSE = 0.001
-"""Seconds in which a process takes little memory, a few pages, and asking costs more than what was done."""
+"""Seconds in which a process takes little memory, and asking costs more than what was done."""
 
-_looked: tuple[float, int | None] = (-math.inf, None)
-"""When the system was asked last, and what it told."""
+
+@dataclass(slots=True)
+class _Told:
+    """What the system told of memory, and when."""
+
+    moment: float = -math.inf
+    taken: int | None = None
+
+
+_last = _Told()
 
 
 def resident_memory() -> int | None:
     """The bytes of this process in memory, now or a thousandth of a second ago; None where the system does
     not tell. Without ``/proc`` it is the most that they ever were."""
-    global _looked
     now = time.monotonic()
-    if now - _looked[0] >= _PAUSE:
-        _looked = (now, _resident_memory())
-    return _looked[1]
+    if now - _last.moment >= _PAUSE:
+        _last.moment, _last.taken = now, _resident_memory()
+    return _last.taken
 
 
 def _resident_memory() -> int | None:
