@@ -21,6 +21,7 @@ from bbtc.belief.draws import (
     Drawer,
     Spend,
     Values,
+    add,
     compile_factor,
     product_of,
     unbounded,
@@ -93,7 +94,9 @@ class Beliefs:
     def number(self, weights: Mapping[int, int]) -> int:
         """The number of the belief with these weights of worlds, none of them 0."""
         common = gcd(*weights.values())
-        belief = tuple((world, weights[world] // common) for world in sorted(weights))
+        if common > 1:
+            weights = {world: weight // common for world, weight in weights.items()}
+        belief = tuple(sorted(weights.items()))
         found = self._numbers.get(belief)
         if found is None:
             found = self._numbers[belief] = len(self.by_number)
@@ -301,8 +304,7 @@ def compile_change(task: Task, change: Change, spend: Spend) -> Drawer:
             sets = [(change.seen[at], value) for at, value in reading.shown]
             sets += readings.beliefs.known(reading.belief)
             sets += [(first + at, octet) for at, octet in enumerate(reading.belief.to_bytes(PLACES, "big"))]
-            key = tuple(sorted(sets)), reading.cost, reading.reward
-            drawn[key] = drawn[key] + reading.probability if key in drawn else reading.probability
+            add(drawn, (tuple(sorted(sets)), reading.cost, reading.reward), reading.probability)
         spend(len(drawn), len(drawn))
         return drawn
 
@@ -360,7 +362,7 @@ class Readings:
                 shown,
                 observed,
                 self.beliefs.number(mass),
-                Fraction(whole, total),
+                ONE if whole == total else Fraction(whole, total),
                 cost / whole if cost else ZERO,
                 reward / whole if reward else ZERO,
             )
