@@ -258,7 +258,7 @@ class HiddenText(Lifted):
                 drawn.append([(Fraction(1, len(form) - 1),
                                {_fact(f, {}) for f in _parts(part) if f[0] != "not"}, every)
                               for part in form[1:]])  # fmt: skip
-            elif form[0] == "oneof" or form[0] == "or" or _denies_more(form):
+            elif form[0] in {"oneof", "or", "imply"} or _denies_more(form):
                 checks.append(form)
         free = [f for f in self.uncertain if not any(f in sets for draw in drawn for _, _, sets in draw)]
         if len(free) > _MOST_OPEN:

@@ -12,7 +12,7 @@ from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
 from bbtc.artefacts import dumps, tree_to_json
-from bbtc.diagnostics import BbtcError, LimitReached, Report
+from bbtc.diagnostics import BbtcError, LimitReached, Report, Severity
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task, verify_tree
@@ -28,8 +28,9 @@ from tests.hidden.tree_on_beliefs import TreeOnBeliefs, formulas_of
 from tests.long_form import amount
 from tests.profiles import examples
 
-_GROUP = 100
-_NOISY = 60
+_GROUP = amount(100, 1_000)
+_NOISY = amount(60, 500)
+"""So many that the shares of each kind are never far from the mean."""
 _PLANNED = amount(30, 1_000)
 _MOST_BELIEFS = 60
 _MOST_LOOKED_AT = 400
@@ -45,7 +46,8 @@ def _task(text: str) -> Task | None:
     try:
         return compile_sources([SourceFile("random.pddl", text)], Report(), Limits())
     except BbtcError as error:
-        if {each.code for each in error.diagnostics} <= {"BBT0412", "BBT0414"}:
+        errors = {each.code for each in error.diagnostics if each.severity is Severity.ERROR}
+        if errors <= {"BBT0412", "BBT0414"}:
             return None
         raise
 
@@ -104,7 +106,7 @@ def _counted(
     return done
 
 
-@pytest.mark.parametrize("group", range(amount(2, 80)))
+@pytest.mark.parametrize("group", range(amount(2, 8)))
 def test_random_texts_are_worth_what_their_words_say(group: int) -> None:
     """P* and the least expected number of actions; where beliefs have no end, within three actions."""
     done = _counted(group, texts(), compare, _GROUP)
@@ -122,7 +124,7 @@ def _noisy(text: str) -> str:
     return _compare_within(text, reference, task, 4)
 
 
-@pytest.mark.parametrize("group", range(amount(1, 34)))
+@pytest.mark.parametrize("group", range(amount(1, 4)))
 def test_random_texts_with_noise_are_worth_what_their_words_say(group: int) -> None:
     """Within four actions, backwards from the last."""
     done = _counted(group, texts(noise=True), _noisy, _NOISY)
@@ -140,7 +142,7 @@ def _planned(text: str, strategy: str) -> str:
     try:
         task = task_of(text)
         tree = plan_task(task, None, strategy, Limits(states=500, nodes=40), lambda _: None).tree
-        runs = TreeOnBeliefs(reference, dumps(tree_to_json(tree)), formulas_of(task)).ends()
+        runs = TreeOnBeliefs(reference, dumps(tree_to_json(tree)), formulas_of(tree.task)).ends()
     except (BbtcError, LimitReached, TooLarge):
         return "none"
     assert runs.faults == [], text

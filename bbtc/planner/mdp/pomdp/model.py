@@ -307,7 +307,7 @@ class _Maker:
         """What an action may do in a world: what is told, the number of the world after, the probability."""
         changes = self._changes[action]
         parts = [
-            readings.parts(bytes(values[variable] for variable in change.seen), world[change.component])
+            list(readings.parts(bytes(values[variable] for variable in change.seen), world[change.component]))
             for change, readings in changes
         ]
         for (delta, _, _), chance in product_of(values, self._drawers[action], self._bounded.spend).items():
