@@ -83,6 +83,22 @@ def test_where_beliefs_read_alike_a_tree_counts() -> None:
     assert [attempts > 1 for _, attempts in retries_of(tree.root)] == [True, True]
 
 
+SOMETIMES_SEEN = """(define (domain d) (:predicates (h) (i) (j) (s) (t))
+  (:action a0 :observe (probabilistic 3/4 (i)))
+  (:action a1 :precondition (imply (not (s)) (not (h))) :observe (j)
+    :effect (and (probabilistic 1/3 (s)) (unknown (j))))
+  (:action mark :observe (h)))
+(define (problem x) (:domain d)
+  (:init (unknown (h)) (unknown (j)) (oneof (h) (i) (j))) (:goal (and (s) (not (t)))))"""
+
+
+def test_an_action_changes_what_is_hidden_whatever_is_seen_of_it() -> None:
+    """In one world of three `h` is so, and nothing can be started. Else `a1` is tried until `s` is so; it
+    draws `j` anew whether it is or not."""
+    found = task_value(task_of(SOMETIMES_SEEN), Limits())
+    assert found.lower == found.upper == Fraction(2, 3)
+
+
 # --- random texts ------------------------------------------------------------------------------------
 
 _MOST_BELIEFS = 60
