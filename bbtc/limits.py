@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -24,13 +25,13 @@ class Stage:
 Watcher: TypeAlias = Callable[[Stage], None]
 
 MOST_WORLDS = 4096
-"""So many worlds a component of hidden facts may have, and a draw of the start so many results."""
+"""So many worlds of a component of hidden facts are listed, and a draw of the start has so many results."""
+
+MOST_NODES = 200_000
+"""So many nodes of decision diagrams are made to write down what is thought of a component at the start."""
 
 PLANNING_SECONDS = 60.0
 """The time that planning may take unless somebody says otherwise."""
-
-_BETWEEN_LOOKS = 0.002
-"""Seconds between two looks at the memory, where time is looked at more often."""
 
 
 @dataclass(slots=True)
@@ -50,8 +51,10 @@ class Limits:
     reading, ``file_bytes`` bounds the size of a file, and ``depth`` how deep its parentheses are nested. Of
     grounding, ``actions`` bounds the ground actions and templates, ``facts`` everything that the
     reachability analysis derives, ``bindings`` the objects that quantifiers are tried with,
-    ``initial_states`` what a draw in ``:init`` is spelled out into. ``memory`` bounds the bytes that this
-    process may take (its resident set), and those of the engine that grounding runs beside it.
+    ``initial_states`` what a draw in ``:init`` is spelled out into, ``worlds`` those of a component that are
+    listed one by one, and ``diagram_nodes`` the decision diagrams where they are not. ``memory`` bounds the
+    bytes that this process may take (its resident set), and those of the engine that grounding runs beside
+    it.
 
     ``watcher`` is told what is being done whenever time is looked at. ``until`` is the moment (of
     ``time.monotonic``) at which a part of the work has to end, ``effort`` another bound on such a part.
@@ -65,6 +68,8 @@ class Limits:
     bindings: int = 100_000_000
     memory: int | None = 4 << 30
     initial_states: int = 256
+    worlds: int = MOST_WORLDS
+    diagram_nodes: int = MOST_NODES
     file_bytes: int = 64 << 20
     depth: int = 100
     watcher: Watcher | None = field(default=None, compare=False, repr=False)
@@ -131,8 +136,7 @@ class Limits:
             self.effort.looks -= 1
             if self.effort.looks < 0:
                 raise self.reached(f"a second opinion ended {doing}", "--time-limit")
-        if self.memory is not None and _Lately.over(self.memory):
-            self.check_memory(doing)
+        self.check_memory(doing)
 
     @property
     def memory_left(self) -> int | None:
@@ -182,25 +186,31 @@ class Limits:
         return LimitReached([Diagnostic("BBT0007", message, hint=f"raise it with {option}")])
 
 
-class _Lately:
-    """When the memory was looked at, and for which limit: to ask the system takes much longer than to look at
-    the clock."""
+_PAUSE = 0.001
+"""Seconds in which a process takes little memory, and asking costs more than what was done."""
 
-    at, limit = 0.0, -1
 
-    @classmethod
-    def over(cls, limit: int) -> bool:
-        """Is it time to look again?"""
-        now = time.monotonic()
-        if limit == cls.limit and now < cls.at + _BETWEEN_LOOKS:
-            return False
-        cls.at, cls.limit = now, limit
-        return True
+@dataclass(slots=True)
+class _Told:
+    """What the system told of memory, and when."""
+
+    moment: float = -math.inf
+    taken: int | None = None
+
+
+_last = _Told()
 
 
 def resident_memory() -> int | None:
-    """The bytes of this process in memory; None where the system does not tell. Without ``/proc`` it is
-    the most that they ever were."""
+    """The bytes of this process in memory, now or a thousandth of a second ago; None where the system does
+    not tell. Without ``/proc`` it is the most that they ever were."""
+    now = time.monotonic()
+    if now - _last.moment >= _PAUSE:
+        _last.moment, _last.taken = now, _resident_memory()
+    return _last.taken
+
+
+def _resident_memory() -> int | None:
     try:
         with open("/proc/self/statm", "rb") as file:  # noqa: PTH123 (called often)
             pages = int(file.read().split()[1])

@@ -18,6 +18,7 @@ from bbtc.artefacts.conditions import condition_from_json, condition_to_json, nu
 from bbtc.artefacts.cursor import At, Faults, clip, run_reader
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
+from bbtc.artefacts.prior_json import check_sum, prior_from_json, prior_to_json
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
 from bbtc.ground.task import (
@@ -105,13 +106,7 @@ def _component_to_json(component: Component, task: Task) -> Json:
     local = component.local(task, component.seen)
     value: Json = {
         "facts": list(component.facts),
-        "prior": [
-            {
-                "p": given_text(probability),
-                "true": [fact for bit, fact in enumerate(component.facts) if world >> bit & 1],
-            }
-            for world, probability in component.prior
-        ],
+        "prior": prior_to_json(component),
         "known": [_knowledge_to_json(knowledge, task, local) for knowledge in component.known],
     }
     if component.seen:
@@ -315,7 +310,7 @@ def read_task(at: At, faults: Faults) -> Task:
         origin=read_task(members["origin"], faults) if "origin" in members else None,
     )
     faults.stop_if_any()
-    _check_sum(members["initial"], [state.probability for state in task.initial])
+    check_sum(members["initial"], [state.probability for state in task.initial])
     _check_distinct(members["actions"], [action.name for action in task.actions])
     _check_templates(members, task, faults)
     return task
@@ -340,12 +335,6 @@ def _check_distinct(at: At, names: Sequence[str]) -> None:
     for name, following in itertools.pairwise(names):
         if name == following:
             raise at.fault("BBT0607", f"'{clip(name)}' stands twice")
-
-
-def _check_sum(at: At, probabilities: Sequence[Fraction]) -> None:
-    total = sum(probabilities, _ZERO)
-    if total != 1:
-        raise at.fault("BBT0608", f"the probabilities sum to {clip(given_text(total))}, not to 1")
 
 
 def _strings(at: At) -> tuple[str, ...]:
@@ -401,14 +390,13 @@ class _Reader:
         facts, seen = _strings(members["facts"]), self._seen(members)
         _check_distinct(members["facts"], sorted(facts))
         local = self._local(facts, seen)
-        prior = tuple(self._world(each, local) for each in members["prior"].elements())
-        _check_sum(members["prior"], [probability for _, probability in prior])
+        prior, diagram = prior_from_json(members["prior"], {fact: at for at, fact in enumerate(facts)})
         known = sorted(
             (self._knowledge(each, local) for each in members["known"].elements()),
             key=lambda each: each.variable,
         )
         first = tuple(local.observation(each) for each in _optional(members, "first"))
-        return Component(facts, prior, tuple(known), first, seen)
+        return Component(facts, prior, tuple(known), first, seen, diagram)
 
     def _knowledge(self, at: At, local: _Reader) -> Knowledge:
         members = at.members(["variable", "condition"], ["at_least"])
@@ -428,13 +416,6 @@ class _Reader:
         """Reads what refers to the local variables of a component."""
         hidden = (Variable(*split_name(fact), three_valued=False, hidden=True) for fact in facts)
         return _Reader.of((*hidden, *(self.variables[variable] for variable in seen)))
-
-    def _world(self, at: At, local: _Reader) -> tuple[int, Fraction]:
-        members = at.members(["p", "true"])
-        world = 0
-        for each in members["true"].elements():
-            world |= 1 << variable_from_json(each, local.index)
-        return world, members["p"].given_probability(zero=False)
 
     def observation(self, at: At) -> Observation:
         members = at.members(["condition"], ["when", "accuracy"])
@@ -507,7 +488,7 @@ class _Reader:
 
     def _factor(self, at: At, oneof: bool, depth: int) -> Factor:
         outcomes = tuple(self._outcome(element, depth) for element in at.elements())
-        _check_sum(at, [outcome.probability for outcome in outcomes])
+        check_sum(at, [outcome.probability for outcome in outcomes])
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:

@@ -11,8 +11,10 @@ from dataclasses import replace
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.draws import Values, unbounded
-from bbtc.belief.hidden import Reading, Readings, beliefs_of, case_of, number_in
+from bbtc.belief.hidden import Readings, beliefs_of, case_of, number_in
 from bbtc.belief.state import initial_belief
+from bbtc.belief.worlds.kernel import Reading
+from bbtc.diagrams import ONE, Diagram, Diagrams
 from bbtc.ground.condition import Condition, replaced, variables
 from bbtc.ground.describe import describe
 from bbtc.ground.task import (
@@ -31,7 +33,7 @@ from bbtc.ground.task import (
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
-from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Sets, Telling
+from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Sets, Telling, Turn, Walk
 from bbtc.tree.nodes import ActionNode, ConditionNode, Node, Tree, actions_of, walk
 
 _TRUE = "really"
@@ -53,7 +55,9 @@ def monitored(tree: Tree, limits: Limits) -> Tree | None:
     names = ObservationNames(task)
     tables = _Tables(task, chain, names, limits)
     world = _World(task, tree.root, parts, names)
-    monitor = Monitor(tuple(map(tables.part, parts)), tuple(world.priors()), tuple(world.tellings()))
+    monitor = Monitor(
+        tuple(map(tables.part, parts)), tuple(world.priors()), tuple(world.tellings()), tuple(world.walks())
+    )
     return replace(tree, task=world.task(), monitor=monitor)
 
 
@@ -243,14 +247,23 @@ class _World:
         )
 
     def priors(self) -> Iterator[tuple[Sets, ...]]:
-        """What may be true at the start, for each component."""
+        """What may be true at the start, for each component whose worlds are listed."""
         for component, first in self._first.items():
+            if self._task.components[component].diagram is not None:
+                continue
             facts = range(len(self._task.components[component].facts))
             yield tuple(
                 Sets(p, tuple((first + bit, Truth.of(bool(world >> bit & 1))) for bit in facts))
                 for world, p in self._task.components[component].prior
                 if p
             )
+
+    def walks(self) -> Iterator[Walk]:
+        """The same of the others."""
+        for component, first in self._first.items():
+            diagram = self._task.components[component].diagram
+            if diagram is not None:
+                yield _walk(diagram, first)
 
     def tellings(self) -> Iterator[Telling]:
         """What the actions tell."""
@@ -302,3 +315,14 @@ class _World:
         """The variable that is the local one of a change."""
         facts = len(self._task.components[change.component].facts)
         return self._first[change.component] + variable if variable < facts else change.seen[variable - facts]
+
+
+def _walk(diagram: Diagram, first: int) -> Walk:
+    """How the facts of a component are drawn, whose variables stand from ``first`` on."""
+    diagrams = Diagrams(diagram.order, len(diagram.nodes) + 2)
+    diagrams.read(diagram)
+    turns = tuple(
+        Turn(level, chance, *(to - 2 if to > ONE else -1 for to in ends))
+        for level, chance, ends in diagrams.turns()
+    )
+    return Walk(tuple(first + place for place in diagram.order), turns)
