@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import atexit
 import ctypes
+import gc
 import io
 import os
 import resource
@@ -20,6 +21,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -166,50 +168,65 @@ def _main() -> None:
         ready = os.dup(1)
         os.dup2(2, 1)
         _warm_up()
+        gc.collect()
+        gc.freeze()  # no child looks through what is loaded
         os.write(ready, b"ready\n")
         os.close(ready)
+        running: dict[int, socket.socket] = {}
         with selectors.DefaultSelector() as waiting:
+            ends = _ends()
             waiting.register(0, selectors.EVENT_READ)
             waiting.register(listener, selectors.EVENT_READ)
+            waiting.register(ends, selectors.EVENT_READ)
             while True:
-                ready_ones = [key.fileobj for key, _ in waiting.select(1)]
+                ready_ones = [key.fileobj for key, _ in waiting.select()]
                 if 0 in ready_ones:
                     return  # who started this process has ended
-                if ready_ones:
-                    _serve(listener)
-                _bury()
+                if ends in ready_ones:
+                    os.read(ends, 1 << 10)
+                    _tell_ends(running)
+                if listener in ready_ones:
+                    _begin(listener, running)
 
 
-def _serve(listener: socket.socket) -> None:
+def _ends() -> int:
+    """A pipe to read from when children have ended."""
+    told, into = os.pipe()
+    os.set_blocking(into, False)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    signal.set_wakeup_fd(into, warn_on_full_buffer=False)
+    return told
+
+
+def _begin(listener: socket.socket, running: dict[int, socket.socket]) -> None:
+    """Begin a run: several may be running at once, each in a child that is known by who waits for its end."""
     connection, _ = listener.accept()
-    with connection:
-        if not os.fork():
-            # Several may be running at once: each has a process that waits for its end.
-            listener.close()
-            _, streams, _, _ = socket.recv_fds(connection, 1, 3)
-            request: Any = ast.literal_eval(connection.makefile("rb").read(_MOST).decode())
-            child = os.fork()
-            if not child:
-                connection.close()
-                for number, stream in enumerate(streams):
-                    os.dup2(stream, number)
-                    os.close(stream)
-                _child(*request)
-            for stream in (0, 1, 2, *streams):
-                os.close(stream)
-            _, status, used = os.wait4(child, 0)
+    _, streams, _, _ = socket.recv_fds(connection, 1, 3)
+    request: Any = ast.literal_eval(connection.makefile("rb").read(_MOST).decode())
+    child = os.fork()
+    if not child:
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        for each in (listener, connection, *running.values()):
+            each.close()
+        for number, stream in enumerate(streams):
+            os.dup2(stream, number)
+            os.close(stream)
+        _child(*request)
+    running[child] = connection
+    for stream in streams:
+        os.close(stream)
+
+
+def _tell_ends(running: dict[int, socket.socket]) -> None:
+    """Tell those who wait how the runs that ended did."""
+    while running:
+        child, status, used = os.wait4(-1, os.WNOHANG)
+        if not child:
+            return
+        with running.pop(child) as connection, suppress(OSError):  # who does not wait any more
             seconds = used.ru_utime + used.ru_stime
             connection.sendall(f"{os.waitstatus_to_exitcode(status)} {seconds}".encode())
-            os._exit(0)
-
-
-def _bury() -> None:
-    """Take note of the ends of those that have waited."""
-    try:
-        while os.waitpid(-1, os.WNOHANG)[0]:
-            pass
-    except ChildProcessError:
-        pass
 
 
 def _warm_up() -> None:
