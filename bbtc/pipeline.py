@@ -509,12 +509,17 @@ def with_worst_world(tree: Tree, figures: Figures, limits: Limits) -> Figures:
         return figures
 
 
-def process_text(task: Task, form: str) -> str:
-    """The task as a Markov decision process, in the format ``prism`` or ``jani``."""
+def process_text(task: Task, form: str, limits: Limits) -> str:
+    """The task as a Markov decision process, in the format ``prism`` or ``jani``; in the format
+    ``prism-pomdp`` of a policy that sees what the robot sees."""
     from bbtc.backends.models import jani, prism
     from bbtc.belief.hidden import refuse_hidden
+    from bbtc.belief.worst_world import with_worlds
 
-    refuse_hidden(task, "written as a Markov decision process")
+    if form == "prism-pomdp":
+        return prism.partial_task_text(with_worlds(task) or task, limits)
+    hint = "--emit prism-pomdp writes what a policy can do that sees what the robot sees"
+    refuse_hidden(task, "written as a Markov decision process", hint)
     return prism.task_text(task) if form == "prism" else jani.task_text(task)
 
 
