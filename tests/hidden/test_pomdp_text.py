@@ -85,7 +85,7 @@ def test_random_tasks_are_worth_what_their_words_say() -> None:
 
 def test_random_tasks_with_noise_are_worth_what_their_words_say() -> None:
     """Within three actions."""
-    many = amount(60, 1_500)
+    many = amount(150, 1_500)
     done: Counter[bool] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])
@@ -95,7 +95,7 @@ def test_random_tasks_with_noise_are_worth_what_their_words_say() -> None:
         try:
             if not reference.prior:
                 return
-            best = reference.within(3, 200)
+            best = reference.within(3, 400)
             if _hopeless(text):
                 return
             assert PomdpText(written(text)).within(3) == best, text
@@ -104,7 +104,7 @@ def test_random_tasks_with_noise_are_worth_what_their_words_say() -> None:
         done[0 < best < 1] += 1
 
     look()
-    assert done[True] > many / 20
+    assert done[True] > many / 30
 
 
 def test_storm_finds_the_same_in_the_text(tmp_path: Path) -> None:
