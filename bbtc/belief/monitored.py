@@ -6,8 +6,10 @@ The table has what the runs of the tree reach, and nothing else: no weights, no 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
+from math import prod
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.draws import Values, unbounded
@@ -15,6 +17,7 @@ from bbtc.belief.hidden import Reading, Readings, beliefs_of, case_of, number_in
 from bbtc.belief.state import initial_belief
 from bbtc.ground.condition import Condition, replaced, variables
 from bbtc.ground.describe import describe
+from bbtc.ground.hidden.given import given_worlds
 from bbtc.ground.task import (
     NO_CHANGE,
     Change,
@@ -31,6 +34,7 @@ from bbtc.ground.task import (
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.markov import distribution, independent
 from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Sets, Telling
 from bbtc.tree.nodes import ActionNode, ConditionNode, Node, Tree, actions_of, walk
 
@@ -52,7 +56,7 @@ def monitored(tree: Tree, limits: Limits) -> Tree | None:
     chain = explore(task, tree.root, limits)
     names = ObservationNames(task)
     tables = _Tables(task, chain, names, limits)
-    world = _World(task, tree.root, parts, names)
+    world = _World(task, tree.root, parts, names, limits)
     monitor = Monitor(tuple(map(tables.part, parts)), tuple(world.priors()), tuple(world.tellings()))
     return replace(tree, task=world.task(), monitor=monitor)
 
@@ -213,8 +217,10 @@ def told_as(told: int | None) -> Truth:
 class _World:
     """A task whose variables tell what is true."""
 
-    def __init__(self, task: Task, root: Node, parts: Sequence[int], names: ObservationNames) -> None:
-        self._task, self._parts, self._names = task, parts, names
+    def __init__(
+        self, task: Task, root: Node, parts: Sequence[int], names: ObservationNames, limits: Limits
+    ) -> None:
+        self._task, self._parts, self._names, self._limits = task, parts, names, limits
         self._actions = sorted({node.action for node in actions_of(root)})
         changed = {change.component for name in self._actions for change in changes_of(task, name)}
         word = _TRUE
@@ -243,14 +249,38 @@ class _World:
         )
 
     def priors(self) -> Iterator[tuple[Sets, ...]]:
-        """What may be true at the start, for each component."""
-        for component, first in self._first.items():
-            facts = range(len(self._task.components[component].facts))
-            yield tuple(
-                Sets(p, tuple((first + bit, Truth.of(bool(world >> bit & 1))) for bit in facts))
-                for world, p in self._task.components[component].prior
-                if p
+        """What may be true at the start: for each component, or, where the problem gives several worlds in
+        which components differ, for these together."""
+        given = given_worlds(self._task)
+        together = []
+        for component in self._first:
+            every = [each[component] for each in given] or [dict(self._task.components[component].prior)]
+            if any(each != every[0] for each in every):
+                together.append(component)
+            else:
+                yield tuple(self._sets({component: world}, p) for world, p in every[0].items() if p)
+        if together:
+            ways = (prod(len(each[component]) for component in together) for each in given)
+            self._limits.check_states(sum(ways), "writing down what is true")
+            drawn = distribution(
+                (worlds, p / len(given))
+                for each in given
+                for worlds, p in independent([each[component] for component in together])
             )
+            yield tuple(
+                self._sets(dict(zip(together, worlds, strict=True)), p) for worlds, p in drawn.items()
+            )
+
+    def _sets(self, worlds: Mapping[int, int], probability: Fraction) -> Sets:
+        """The facts of some components as in their worlds."""
+        return Sets(
+            probability,
+            tuple(
+                (self._first[component] + bit, Truth.of(bool(world >> bit & 1)))
+                for component, world in worlds.items()
+                for bit in range(len(self._task.components[component].facts))
+            ),
+        )
 
     def tellings(self) -> Iterator[Telling]:
         """What the actions tell."""

@@ -268,6 +268,15 @@ class InitialState:
     values: tuple[Truth, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class TrueWorld:
+    """What is true, and what is false, of the hidden facts at the start of a simulated run, by name; others
+    are false, if that can be."""
+
+    true: frozenset[str]
+    false: frozenset[str] = frozenset()
+
+
 @dataclass(frozen=True)
 class Task:
     """A ground planning task. Actions, templates and variables are sorted by name, signatures by
@@ -293,6 +302,9 @@ class Task:
     unlowered: Task | None = field(default=None, compare=False, repr=False)
     """The task with all hidden facts that this was made of, over the same variables, as long as it is at
     hand: artefacts do not hold it."""
+    true_worlds: tuple[TrueWorld, ...] = ()
+    """What the problem says is true at the start of simulated runs, which begin in one of them. Nothing else
+    reads it."""
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property

@@ -85,7 +85,7 @@ def test_random_tasks_are_worth_what_their_words_say() -> None:
 
 def test_random_tasks_with_noise_are_worth_what_their_words_say() -> None:
     """Within three actions."""
-    many = amount(150, 1_500)
+    many = amount(80, 1_500)
     done: Counter[bool] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])

@@ -12,6 +12,7 @@ from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, compile_condition, variables
 from bbtc.ground.hidden.changes import Local, act, divided, join, read_after, telling
 from bbtc.ground.hidden.failing import may_fail
+from bbtc.ground.hidden.given import contradicts
 from bbtc.ground.hidden.groups import Groups
 from bbtc.ground.hidden.knowledge import KnownConditions, TooManyCases
 from bbtc.ground.hidden.naming import formula_names
@@ -178,9 +179,11 @@ class _Compiler:
         for component in components:
             for variable, value in _known_at_first(component):
                 values[variable] = value
+        true_worlds = tuple(self._true_worlds(components))
         made = replace(
             made,
             components=tuple(components),
+            true_worlds=true_worlds,
             initial=(gt.InitialState(Fraction(1), tuple(values)),),
         )
         last = len(self._found.task.variables)
@@ -205,6 +208,25 @@ class _Compiler:
         for reading in self._told_first:
             leader = next(self._groups.of(each) for each in read_after([reading]) if each in self._groups)
             self._first_of.setdefault(leader, []).append(reading)
+
+    def _true_worlds(self, components: Iterable[gt.Component]) -> Iterator[gt.TrueWorld]:
+        """What is true in simulated runs, as far as it is hidden and matters."""
+        components = list(components)
+        hidden = {fact for component in components for fact in component.facts}
+        for said in self._model.true_worlds:
+            named = [(gt.ground_name(fact.predicate, fact.args), fact) for fact in said]
+            mine = [(name, fact) for name, fact in named if name in hidden]
+            world = gt.TrueWorld(
+                frozenset(name for name, fact in mine if fact.value is Truth.TRUE),
+                frozenset(name for name, fact in mine if fact.value is Truth.FALSE),
+            )
+            for component in components:
+                if contradicts(component, world):
+                    span = next(fact.span for name, fact in mine if name in component.facts)
+                    told = "what is said to be true at the start cannot be, by what is said to be known then"
+                    hint = "runs begin in a world that can be"
+                    self._report.warning("BBT0431", told, span, hint)
+            yield world
 
     # --- conditions --------------------------------------------------------------------------
 
