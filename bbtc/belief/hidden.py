@@ -167,7 +167,7 @@ def refuse_hidden(task: Task, done: str, hint: str | None = None) -> None:
     ``done`` to it."""
     if task.components:
         fact = task.components[0].facts[0]
-        message = f"a task with hidden facts, such as {fact}, cannot be {done} yet"
+        message = f"a task with hidden facts, such as {fact}, cannot be {done}"
         raise BbtcError.single("BBT0506", message, hint=hint)
 
 
