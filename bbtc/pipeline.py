@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Report, Severity
 from bbtc.ground.task import Task
-from bbtc.limits import Limits
+from bbtc.limits import MOST_WORLDS, Limits
 from bbtc.rounding import figure_text
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
 from bbtc.tree.nodes import PlanStatus, Tree
@@ -497,16 +497,29 @@ _STATES_OF_WORLDS = 20_000
 
 def with_worst_world(tree: Tree, figures: Figures, limits: Limits) -> Figures:
     """The figures with what the tree attains in the worst world that hidden facts may make at the start, as
-    far as the limits allow."""
+    far as the limits allow; else with the reason why that is not told, unless the tree always succeeds."""
     from bbtc.belief.worst_world import WorstWorld, with_worlds, worst_world
 
-    if figures.success == 1 and with_worlds(tree.task) is not None:
-        return replace(figures, worst=WorstWorld(figures.success, (), frozenset()))
-    limits = replace(limits, states=min(limits.states, _STATES_OF_WORLDS))
+    full = with_worlds(tree.task)
+    if figures.success == 1:
+        worst = None if full is None else WorstWorld(figures.success, (), frozenset())
+        return replace(figures, worst=worst)
+    if full is None:
+        hides = any(variable.hidden for variable in tree.task.variables)
+        untold = "the tree does not hold the worlds of its hidden facts: give the domain and the problem, too"
+        return replace(figures, worst_untold=untold) if hides else figures
+    states = min(limits.states, _STATES_OF_WORLDS)
     try:
-        return replace(figures, worst=worst_world(tree.task, tree.root, limits))
-    except LimitReached:
-        return figures
+        found = worst_world(tree.task, tree.root, replace(limits, states=states))
+    except LimitReached as reached:
+        untold = reached.diagnostics[0].message
+        if not limits.met:
+            untold = f"more than {states:,} states of worlds and beliefs would have to be looked at"
+        return replace(figures, worst_untold=untold)
+    if found is None:
+        untold = f"the hidden facts that matter to the tree have more than {MOST_WORLDS:,} worlds"
+        return replace(figures, worst_untold=untold)
+    return replace(figures, worst=found)
 
 
 def process_text(task: Task, form: str, limits: Limits) -> str:
