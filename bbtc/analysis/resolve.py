@@ -205,7 +205,7 @@ def _observables(domain: ast.Definition) -> frozenset[str]:
 
 def _observed(names: Names, node: ast.Observation, scope: dict[str, Parameter]) -> mf.Formula | me.Choice:
     if isinstance(node.content, ast.Probabilistic):
-        return formulas.probabilistic(names, node.content, scope)
+        return formulas.noisy_reading(names, node.content, scope)
     return formulas.formula(names, node.content, scope)
 
 

@@ -49,6 +49,8 @@ def observation_to_json(observation: Observation, local: Sequence[Variable]) -> 
         value["when"] = condition_to_json(observation.when, local)
     if observation.accuracy != 1:
         value["accuracy"] = given_text(observation.accuracy)
+    if observation.accuracy_false is not None:
+        value["accuracy_false"] = given_text(observation.accuracy_false)
     return value
 
 

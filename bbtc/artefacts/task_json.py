@@ -414,11 +414,12 @@ class _Reader:
         return world, members["p"].given_probability(zero=False)
 
     def observation(self, at: At) -> Observation:
-        members = at.members(["condition"], ["when", "accuracy"])
+        members = at.members(["condition"], ["when", "accuracy", "accuracy_false"])
         return Observation(
             self.condition(members["condition"]),
             members["accuracy"].given_probability() if "accuracy" in members else _ONE,
             self.condition(members["when"]) if "when" in members else None,
+            members["accuracy_false"].given_probability() if "accuracy_false" in members else None,
         )
 
     def change(self, at: At) -> Change:

@@ -15,7 +15,7 @@ from bbtc.belief.chain import Chain, explore
 from bbtc.belief.draws import Values, unbounded
 from bbtc.belief.hidden import Reading, Readings, beliefs_of, case_of, number_in
 from bbtc.belief.state import initial_belief
-from bbtc.ground.condition import Condition, replaced, variables
+from bbtc.ground.condition import TRUE, Condition, conjunction, negation, replaced, variables
 from bbtc.ground.describe import describe
 from bbtc.ground.hidden.given import given_worlds
 from bbtc.ground.task import (
@@ -291,8 +291,17 @@ class _World:
                 names = self._names.of(action, change.component)
                 for name, observation in zip(names, change.observations, strict=True):
                     when = None if observation.when is None else self._moved(observation.when, change)
-                    told = Observation(self._moved(observation.condition, change), observation.accuracy, when)
-                    yield Telling(action, name, told)
+                    condition = self._moved(observation.condition, change)
+                    told = Observation(condition, observation.accuracy, when)
+                    if observation.accuracy_false is None:
+                        yield Telling(action, name, told)
+                        continue
+                    # Two, of which one is made.
+                    whether = TRUE if when is None else when
+                    yield Telling(action, name, replace(told, when=conjunction([whether, condition])))
+                    otherwise = conjunction([whether, negation(condition)])
+                    accuracy = observation.accuracy_false
+                    yield Telling(action, name, replace(told, accuracy=accuracy, when=otherwise))
 
     def _action(self, action: GroundAction) -> GroundAction:
         factors = [factor for factor in action.factors if factor != NO_CHANGE]

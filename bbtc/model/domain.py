@@ -70,11 +70,12 @@ class Schema:
 @dataclass(frozen=True, slots=True)
 class Reading:
     """Where ``when`` holds after an action, it is told whether ``condition`` is true, rightly with the
-    probability ``accuracy``."""
+    probability ``accuracy``; where it is false with ``accuracy_false``, unless that is None."""
 
     condition: Formula
     accuracy: Fraction
     when: Formula
+    accuracy_false: Fraction | None = None
 
 
 @dataclass(frozen=True, slots=True)

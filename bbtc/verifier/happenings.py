@@ -106,7 +106,8 @@ def readings(observations: Sequence[Observation], values: Sequence[int]) -> list
             tells: list[tuple[Fraction, bool | None]] = [(_ONE, None)]
         else:
             true = evaluate(each.condition, values) is Truth.TRUE
-            tells = [(each.accuracy, true), (1 - each.accuracy, not true)]
+            right = each.right(true)
+            tells = [(right, true), (1 - right, not true)]
         found = [(p * q, (*told, tell)) for p, told in found for q, tell in tells if q]
     return found
 

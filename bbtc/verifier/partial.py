@@ -287,11 +287,11 @@ class _Writer:
 
         def step(own: int, then: int) -> Iterator[Command]:
             go_on = put(self._stage, then)
-            right, wrong = observation.accuracy, 1 - observation.accuracy
-            for when, yes, no in ((true, right, wrong), (none_of(true), wrong, right)):
+            yes_if = {True: observation.right(True), False: 1 - observation.right(False)}
+            for when, yes in ((true, yes_if[True]), (none_of(true), yes_if[False])):
                 if all_of(made, when) != NO:
                     branches = [
-                        _branch([put(cell, value), go_on], p) for value, p in ((2, yes), (1, no)) if p
+                        _branch([put(cell, value), go_on], p) for value, p in ((2, yes), (1, 1 - yes)) if p
                     ]
                     yield self._command(own, "", *branches, when=all_of(made, when))
             if made != YES:

@@ -72,7 +72,7 @@ def test_each_world_by_itself_is_no_worse(noise: bool, lower: bool) -> None:
         done[_compared(text, lower=lower, noise=noise)] += 1
 
     each()
-    assert done["worse"] > 2, done
+    assert done["worse"] > 1, done
 
 
 CUPS = """(define (domain cups) (:types cup)

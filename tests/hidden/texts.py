@@ -81,7 +81,9 @@ def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
         if kind < 3:
             told = draw(_condition(HIDDEN)) if draw(st.booleans()) else f"({draw(st.sampled_from(ATOMS))})"
             if noise and draw(st.booleans()):
-                told = f"(probabilistic 3/4 ({draw(st.sampled_from(HIDDEN))}))"
+                fact = draw(st.sampled_from(HIDDEN))
+                other = draw(st.sampled_from(["", "", f" 1/2 (not ({fact}))", f" 1 (not ({fact}))"]))
+                told = f"(probabilistic 3/4 ({fact}){other})"
             form += f" :observe {told}"
         if kind in {0, 3}:
             form += f" :effect {draw(_effect())}"
