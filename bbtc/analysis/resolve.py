@@ -119,6 +119,14 @@ def resolve(
     return None if report.errors else model
 
 
+_INSTEAD = dict.fromkeys(
+    (":percepts", ":observe"),
+    "DT-PDDL collects rewards; with a goal to reach, say what an action tells in the action: "
+    "`:observe (probabilistic q (p))`",
+)
+"""By construct that is refused: what to write in its place."""
+
+
 def _check_sections(report: Report, domain: ast.Definition, problem: ast.Definition | None) -> None:
     """Refuse constructs by name, sections in the wrong definition, and second goals."""
     for definition in (domain, problem) if problem is not None else (domain,):
@@ -127,12 +135,10 @@ def _check_sections(report: Report, domain: ast.Definition, problem: ast.Definit
         seen: dict[str, ast.Section] = {}
         for section in definition.sections:
             if isinstance(section, ast.Unsupported):
-                report.error(
-                    "BBT0212",
-                    f"`{section.construct}` is not supported",
-                    section.span,
-                    "actions take no time here, and numbers are costs and rewards",
+                hint = _INSTEAD.get(
+                    section.construct, "actions take no time here, and numbers are costs and rewards"
                 )
+                report.error("BBT0212", f"`{section.construct}` is not supported", section.span, hint)
             elif isinstance(section, wrong) or (
                 isinstance(section, ast.TypedSection) and section.kind == "types" and other == "domain"
             ):
