@@ -11,6 +11,7 @@ from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, compile_condition, variables
 from bbtc.ground.hidden.changes import Local, act, divided, join, read_after, telling
+from bbtc.ground.hidden.derived_tests import with_asked
 from bbtc.ground.hidden.failing import may_fail
 from bbtc.ground.hidden.given import contradicts
 from bbtc.ground.hidden.groups import Groups
@@ -35,10 +36,11 @@ _MOST_NAMED = 4
 def hidden_task(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """The task of a model with hidden state. Raises as :func:`bbtc.ground.instantiate.ground` does."""
     with collector_paused():
+        model, asked = with_asked(model)
         found = physical(model, report, limits)
         if model.may_fail:
             found = may_fail(found)
-        return _Compiler(model, found, report, limits).task()
+        return _Compiler(model, asked, found, report, limits).task()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +53,16 @@ class _Read:
 
 
 class _Compiler:
-    def __init__(self, model: md.Model, found: Physical, report: Report, limits: Limits) -> None:
+    def __init__(
+        self, model: md.Model, asked: frozenset[str], found: Physical, report: Report, limits: Limits
+    ) -> None:
         self._model = model
+        self._tests = {
+            number: condition
+            for number, (condition, _) in found.thresholds.items()
+            if found.task.variables[number].predicate in asked
+        }
+        """By variable that stands for a derived fact whose knowledge is asked for: what that is."""
         self._found = found
         self._report = report
         self._limits = limits
@@ -103,7 +113,7 @@ class _Compiler:
     def _asked_beliefs(self) -> Iterator[tuple[int, tuple[Condition, Fraction]]]:
         """The thresholds that matter. What they ask has to be hidden."""
         for number, (condition, at_least) in self._found.thresholds.items():
-            if number not in self._kept:
+            if number not in self._kept or number in self._tests:
                 continue
             every = self._found.task.variables
             seen = [every[each].name for each in variables(condition) if each not in self._hidden]
@@ -191,6 +201,7 @@ class _Compiler:
             number
             for number in range(len(made.variables))
             if (number in asked if number in self._hidden or number >= last else number in self._kept)
+            and number not in self._tests
         ]
         return reordered(made, sorted(order, key=lambda number: made.variables[number].name))
 
@@ -235,7 +246,7 @@ class _Compiler:
         task = self._found.task
         while True:
             self._limits.check_time("grounding")
-            knowledge = KnownConditions(self._groups, len(task.variables))
+            knowledge = KnownConditions(self._groups, task.variables, self._tests)
             goal = self._known(knowledge, task.goal, task.goal_span)
             preconditions = [
                 self._known(knowledge, each.action.precondition, each.action.span) for each in self._acts
