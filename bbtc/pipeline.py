@@ -462,7 +462,7 @@ def plan_task(
         search_ends()
         if plan is None and best.empty:
             raise
-        plan = unjudged(plan or best.plan("limit-reached", reached.diagnostics[0]))
+        plan = unjudged(plan or best.plan("limit-reached", reached.diagnostics[0]), reached)
     except KeyboardInterrupt:
         search_ends()
         plan = plan or best.plan("interrupted")
