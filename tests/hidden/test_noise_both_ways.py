@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import runpy
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 
@@ -111,6 +113,21 @@ def test_trees_are_simulated_verified_and_exported() -> None:
     assert worst.true == frozenset()
     for form in ("py_trees", "prism", "jani", "json"):
         assert export_tree(plan.tree, form, {}, Limits())
+
+
+def test_the_simulated_world_of_an_export_errs_so(tmp_path: Path) -> None:
+    """In each world one reading is made, under one name, and as often right as the domain says."""
+    plan = planned(ward().replace("0.1 (ill)", "0.5 (ill)"))
+    written = export_tree(plan.tree, "py_trees", {}, Limits())
+    assert isinstance(written, str)
+    (tmp_path / "ward.py").write_text(written, "utf-8")
+    tellings = runpy.run_path(str(tmp_path / "ward.py"))["TELLINGS"]["test",]
+    assert len(tellings) == 2
+    assert len({each.name for each in tellings}) == 1
+    for ill, accuracy in ((True, "9/10"), (False, "7/10")):
+        (made,) = (each for each in tellings if each.when({("really ill",): ill}))
+        assert made.accuracy == accuracy
+        assert made.tells({("really ill",): ill}) is ill
 
 
 def test_a_task_is_written_and_read() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from bbtc.artefacts import dumps, load_task, load_tree, task_to_json, tree_to_json
+from bbtc.backends.exporter import Files
 from bbtc.belief.monitored import with_hidden
 from bbtc.belief.stepper import Stepper
 from bbtc.diagnostics import Report
@@ -177,6 +178,17 @@ def test_simulated_worlds_of_exports_begin_there(text: str, tmp_path: Path) -> N
         truths.update(line for line in done.stdout.splitlines() if line.startswith("the truth: "))
         assert "success" in done.stdout.lower()
     assert truths == {f"the truth: {each}" for each in shown}
+
+
+def test_robots_in_cpp_begin_there() -> None:
+    """The world of the project draws nothing at the start."""
+    plan, _ = compiled(SHELVES, "(:hidden (can c))")
+    files = export_tree(plan.tree, "btcpp_project", {}, Limits())
+    assert isinstance(files, Files)
+    (header,) = (text for name, text in files.texts.items() if name.endswith("simulated_robot.hpp"))
+    priors = header.partition("/*priors=*/")[2].partition("/*tellings=*/")[0]
+    assert priors.count("Truth::True") == 1
+    assert priors.count("Truth::False") == 2
 
 
 def test_the_program_runs_there(tmp_path: Path) -> None:
