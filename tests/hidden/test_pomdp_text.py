@@ -184,10 +184,22 @@ NESTED = """
 """
 
 
-@pytest.mark.parametrize("text", [CAVE, BUMPER, NESTED], ids=["sensor", "observed", "nested draw"])
+ONE_WAY = """
+(define (domain one-way)
+  (:predicates (ill) (well))
+  (:action look :observe (probabilistic 0.5 (ill) 1 (not (ill))))
+  (:action treat :precondition (ill) :effect (probabilistic 0.9 (well))))
+(define (problem patient) (:domain one-way) (:init (probabilistic 0.3 (ill))) (:goal (well)))
+"""
+
+
+@pytest.mark.parametrize(
+    "text", [CAVE, BUMPER, NESTED, ONE_WAY], ids=["sensor", "observed", "nested draw", "errs one way"]
+)
 def test_tasks_by_hand_are_worth_as_much(text: str) -> None:
     """A sensor that tells at the start, facts that are always seen in two components beside a draw, and a
-    draw within another that the robot sees a part of. Within five actions."""
+    draw within another that the robot sees a part of, and a reading that is sometimes wrong one way, and
+    never the other. Within five actions."""
     best = task_value(task_of(text), Limits(), Options(max_actions=5))
     assert best.lower == best.upper > 0
     assert PomdpText(written(text)).within(5) == best.lower

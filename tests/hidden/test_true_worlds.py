@@ -11,6 +11,7 @@ import pytest
 
 from bbtc.artefacts import dumps, load_task, load_tree, task_to_json, tree_to_json
 from bbtc.backends.exporter import Files
+from bbtc.belief.hidden import belief_in
 from bbtc.belief.monitored import with_hidden
 from bbtc.belief.stepper import Stepper
 from bbtc.diagnostics import Report
@@ -110,6 +111,20 @@ def test_runs_begin_in_the_world_that_is_given(text: str, true: str, worlds: lis
     found = runs(plan.tree)
     assert {truth for truth, _, _ in found} == {frozenset(world) for world in worlds}
     assert {status for _, _, status in found} == {"SUCCESS"}
+
+
+@pytest.mark.parametrize(("accuracy", "least", "most"), [("1", 100, 100), ("0.9", 80, 98)])
+def test_what_is_told_at_first_follows_from_what_is_true(accuracy: str, least: int, most: int) -> None:
+    """Of a hundred runs in the rain, though it seldom rains."""
+    plan, _ = compiled(SENSED.replace("0.9", accuracy), "(:hidden (wet))")
+    task, wet = with_hidden(plan.tree.task), 0
+    for seed in range(100):
+        stepper = Stepper(task, plan.tree.root, seed)
+        stepper.start()
+        belief = dict(belief_in(task, stepper.now.state.values, 0))
+        wet += belief.get(1, 0) > belief.get(0, 0) / 2  # told so, 9 to 4; else 1 to 36
+        assert stepper.truth.facts(stepper.now.worlds) == ["wet()"]
+    assert least <= wet <= most
 
 
 def test_what_the_robot_does_follows_from_what_is_true() -> None:
