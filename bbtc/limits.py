@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -24,7 +25,10 @@ class Stage:
 Watcher: TypeAlias = Callable[[Stage], None]
 
 MOST_WORLDS = 4096
-"""So many worlds a component of hidden facts may have, and a draw of the start so many results."""
+"""So many worlds of a component of hidden facts are listed, and a draw of the start has so many results."""
+
+MOST_NODES = 200_000
+"""So many nodes of decision diagrams are made to write down what is thought of a component at the start."""
 
 PLANNING_SECONDS = 60.0
 """The time that planning may take unless somebody says otherwise."""
@@ -47,8 +51,10 @@ class Limits:
     reading, ``file_bytes`` bounds the size of a file, and ``depth`` how deep its parentheses are nested. Of
     grounding, ``actions`` bounds the ground actions and templates, ``facts`` everything that the
     reachability analysis derives, ``bindings`` the objects that quantifiers are tried with,
-    ``initial_states`` what a draw in ``:init`` is spelled out into. ``memory`` bounds the bytes that this
-    process may take (its resident set), and those of the engine that grounding runs beside it.
+    ``initial_states`` what a draw in ``:init`` is spelled out into, ``worlds`` those of a component that are
+    listed one by one, and ``diagram_nodes`` the decision diagrams where they are not. ``memory`` bounds the
+    bytes that this process may take (its resident set), and those of the engine that grounding runs beside
+    it.
 
     ``watcher`` is told what is being done whenever time is looked at. ``until`` is the moment (of
     ``time.monotonic``) at which a part of the work has to end, ``effort`` another bound on such a part.
@@ -62,6 +68,8 @@ class Limits:
     bindings: int = 100_000_000
     memory: int | None = 4 << 30
     initial_states: int = 256
+    worlds: int = MOST_WORLDS
+    diagram_nodes: int = MOST_NODES
     file_bytes: int = 64 << 20
     depth: int = 100
     watcher: Watcher | None = field(default=None, compare=False, repr=False)
@@ -178,9 +186,31 @@ class Limits:
         return LimitReached([Diagnostic("BBT0007", message, hint=f"raise it with {option}")])
 
 
+_PAUSE = 0.001
+"""Seconds in which a process takes little memory, and asking costs more than what was done."""
+
+
+@dataclass(slots=True)
+class _Told:
+    """What the system told of memory, and when."""
+
+    moment: float = -math.inf
+    taken: int | None = None
+
+
+_last = _Told()
+
+
 def resident_memory() -> int | None:
-    """The bytes of this process in memory; None where the system does not tell. Without ``/proc`` it is
-    the most that they ever were."""
+    """The bytes of this process in memory, now or a thousandth of a second ago; None where the system does
+    not tell. Without ``/proc`` it is the most that they ever were."""
+    now = time.monotonic()
+    if now - _last.moment >= _PAUSE:
+        _last.moment, _last.taken = now, _resident_memory()
+    return _last.taken
+
+
+def _resident_memory() -> int | None:
     try:
         with open("/proc/self/statm", "rb") as file:  # noqa: PTH123 (called often)
             pages = int(file.read().split()[1])

@@ -21,8 +21,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 REPOSITORY = Path(__file__).resolve().parent.parent
 GOLDEN = Path(__file__).resolve().parent / "golden"
 
-# Beside all that tests and Hypothesis hold, looking for cycles at every 700 new objects takes its time.
-gc.set_threshold(20_000, 10, 10)
+# Beside all that tests and Hypothesis hold, looking for cycles at every 700 new objects takes its time, and
+# to look through everything, millions of objects in the end, seconds.
+gc.set_threshold(20_000, 10, 1_000)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

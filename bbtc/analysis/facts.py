@@ -177,7 +177,7 @@ def _close(model: md.Model, result: Reached) -> None:
         before = len(result.values)
         for number in due:
             steps[number][1]()
-        fresh = {name for name, _ in islice(result.values, before, None)}
+        fresh = {name for name, _ in islice(reversed(result.values), len(result.values) - before)}
         due = sorted({number for name in fresh for number in readers.get(name, ())})
 
 

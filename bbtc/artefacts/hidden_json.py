@@ -8,6 +8,7 @@ from typing import TypeAlias
 from bbtc.artefacts.conditions import condition_to_json
 from bbtc.artefacts.cursor import At
 from bbtc.artefacts.numbers import given_text
+from bbtc.artefacts.prior_json import prior_to_json
 from bbtc.ground.task import Component, Knowledge, Observation, Task, TrueWorld, Variable
 
 Json: TypeAlias = dict[str, object]
@@ -18,13 +19,7 @@ def component_to_json(component: Component, task: Task) -> Json:
     local = component.local(task, component.seen)
     value: Json = {
         "facts": list(component.facts),
-        "prior": [
-            {
-                "p": given_text(probability),
-                "true": [fact for bit, fact in enumerate(component.facts) if world >> bit & 1],
-            }
-            for world, probability in component.prior
-        ],
+        "prior": prior_to_json(component),
         "known": [_knowledge_to_json(knowledge, task, local) for knowledge in component.known],
     }
     if component.seen:

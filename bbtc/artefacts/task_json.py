@@ -19,6 +19,7 @@ from bbtc.artefacts.cursor import At, Faults, clip, run_reader
 from bbtc.artefacts.hidden_json import component_to_json, observation_to_json, true_world, true_world_to_json
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
+from bbtc.artefacts.prior_json import check_sum, prior_from_json
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
 from bbtc.ground.task import (
@@ -296,7 +297,7 @@ def read_task(at: At, faults: Faults) -> Task:
         ),
     )
     faults.stop_if_any()
-    _check_sum(members["initial"], [state.probability for state in task.initial])
+    check_sum(members["initial"], [state.probability for state in task.initial])
     _check_distinct(members["actions"], [action.name for action in task.actions])
     _check_templates(members, task, faults)
     return task
@@ -321,12 +322,6 @@ def _check_distinct(at: At, names: Sequence[str]) -> None:
     for name, following in itertools.pairwise(names):
         if name == following:
             raise at.fault("BBT0607", f"'{clip(name)}' stands twice")
-
-
-def _check_sum(at: At, probabilities: Sequence[Fraction]) -> None:
-    total = sum(probabilities, _ZERO)
-    if total != 1:
-        raise at.fault("BBT0608", f"the probabilities sum to {clip(given_text(total))}, not to 1")
 
 
 def _variable(at: At) -> Variable:
@@ -378,14 +373,13 @@ class _Reader:
         facts, seen = members["facts"].strings(), self._seen(members)
         _check_distinct(members["facts"], sorted(facts))
         local = self._local(facts, seen)
-        prior = tuple(self._world(each, local) for each in members["prior"].elements())
-        _check_sum(members["prior"], [probability for _, probability in prior])
+        prior, diagram = prior_from_json(members["prior"], {fact: at for at, fact in enumerate(facts)})
         known = sorted(
             (self._knowledge(each, local) for each in members["known"].elements()),
             key=lambda each: each.variable,
         )
         first = tuple(local.observation(each) for each in _optional(members, "first"))
-        return Component(facts, prior, tuple(known), first, seen)
+        return Component(facts, prior, tuple(known), first, seen, diagram)
 
     def _knowledge(self, at: At, local: _Reader) -> Knowledge:
         members = at.members(["variable", "condition"], ["at_least"])
@@ -405,13 +399,6 @@ class _Reader:
         """Reads what refers to the local variables of a component."""
         hidden = (Variable(*split_name(fact), three_valued=False, hidden=True) for fact in facts)
         return _Reader.of((*hidden, *(self.variables[variable] for variable in seen)))
-
-    def _world(self, at: At, local: _Reader) -> tuple[int, Fraction]:
-        members = at.members(["p", "true"])
-        world = 0
-        for each in members["true"].elements():
-            world |= 1 << variable_from_json(each, local.index)
-        return world, members["p"].given_probability(zero=False)
 
     def observation(self, at: At) -> Observation:
         members = at.members(["condition"], ["when", "accuracy", "accuracy_false"])
@@ -485,7 +472,7 @@ class _Reader:
 
     def _factor(self, at: At, oneof: bool, depth: int) -> Factor:
         outcomes = tuple(self._outcome(element, depth) for element in at.elements())
-        _check_sum(at, [outcome.probability for outcome in outcomes])
+        check_sum(at, [outcome.probability for outcome in outcomes])
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:

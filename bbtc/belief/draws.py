@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from fractions import Fraction
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from bbtc.ground.condition import compile_condition
 from bbtc.ground.task import ONE, ZERO, Effect, Factor, Outcome
 from bbtc.kleene import Truth
+
+K = TypeVar("K")
 
 Values: TypeAlias = bytes
 """The truth value of every variable of the task, by index; behind them, of each component of hidden facts,
@@ -45,11 +47,18 @@ def product_of(values: Values, drawers: Iterable[Drawer], spend: Spend) -> dict[
         for (delta, cost, reward), p in total.items():
             for (delta2, cost2, reward2), p2 in drawn.items():
                 key = (_unite(delta, delta2), _plus(cost, cost2), _plus(reward, reward2))
-                joint = p if p2 is ONE else p2 if p is ONE else p * p2
-                combined[key] = combined[key] + joint if key in combined else joint
+                add(combined, key, p if p2 is ONE else p2 if p is ONE else p * p2)
             spend(len(drawn), len(combined))
         total = combined
     return {((), ZERO, ZERO): ONE} if total is None else total
+
+
+def add(to: dict[K, Fraction], key: K, probability: Fraction) -> None:
+    """Add to the probability of one thing; its hash, which takes time, is worked out once if it is new."""
+    count = len(to)
+    before = to.setdefault(key, probability)
+    if len(to) == count:
+        to[key] = before + probability
 
 
 def _plus(first: Fraction, second: Fraction) -> Fraction:
@@ -85,8 +94,7 @@ def compile_factor(factor: Factor, spend: Spend) -> Drawer:
             product = product_of(values, nested, spend)
             for (delta2, cost2, reward2), p in product.items():
                 key = (_unite(delta, delta2), _plus(cost, cost2), _plus(reward, reward2))
-                joint = probability if p is ONE else probability * p
-                drawn[key] = drawn[key] + joint if key in drawn else joint
+                add(drawn, key, probability if p is ONE else probability * p)
             spend(len(product), len(drawn))
         return drawn
 

@@ -142,7 +142,7 @@ class _Lowering:
 
     def explored(self) -> bool:
         """Look at all beliefs; are they few, and does what is known tell them apart?"""
-        if len(self._component.prior) > _MOST_WORLDS:
+        if self._component.diagram is not None or len(self._component.prior) > _MOST_WORLDS:
             return False
         if any(2 ** len(doing.seen) > _MOST_SEEN for doing in self._doings):
             return False

@@ -13,8 +13,10 @@ from math import prod
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.draws import Values, unbounded
-from bbtc.belief.hidden import Reading, Readings, beliefs_of, case_of, number_in
+from bbtc.belief.hidden import Readings, beliefs_of, case_of, number_in
 from bbtc.belief.state import initial_belief
+from bbtc.belief.worlds.kernel import Reading
+from bbtc.diagrams import ONE, Diagram, Diagrams
 from bbtc.ground.condition import TRUE, Condition, conjunction, negation, replaced, variables
 from bbtc.ground.describe import describe
 from bbtc.ground.hidden.given import given_worlds
@@ -35,7 +37,7 @@ from bbtc.ground.task import (
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.markov import distribution, independent
-from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Sets, Telling
+from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Sets, Telling, Turn, Walk
 from bbtc.tree.nodes import ActionNode, ConditionNode, Node, Tree, actions_of, walk
 
 _TRUE = "really"
@@ -57,7 +59,9 @@ def monitored(tree: Tree, limits: Limits) -> Tree | None:
     names = ObservationNames(task)
     tables = _Tables(task, chain, names, limits)
     world = _World(task, tree.root, parts, names, limits)
-    monitor = Monitor(tuple(map(tables.part, parts)), tuple(world.priors()), tuple(world.tellings()))
+    monitor = Monitor(
+        tuple(map(tables.part, parts)), tuple(world.priors()), tuple(world.tellings()), tuple(world.walks())
+    )
     return replace(tree, task=world.task(), monitor=monitor)
 
 
@@ -251,9 +255,11 @@ class _World:
     def priors(self) -> Iterator[tuple[Sets, ...]]:
         """What may be true at the start: for each component, or, where the problem gives several worlds in
         which components differ, for these together."""
-        given = given_worlds(self._task)
+        given = [[each or {} for each in worlds] for worlds in given_worlds(self._task)]
         together = []
         for component in self._first:
+            if self._walked(component):
+                continue
             every = [each[component] for each in given] or [dict(self._task.components[component].prior)]
             if any(each != every[0] for each in every):
                 together.append(component)
@@ -281,6 +287,19 @@ class _World:
                 for bit in range(len(self._task.components[component].facts))
             ),
         )
+
+    def walks(self) -> Iterator[Walk]:
+        """The same of the others."""
+        for component, first in self._first.items():
+            diagram = self._task.components[component].diagram
+            if diagram is not None and self._walked(component):
+                yield _walk(diagram, first)
+
+    def _walked(self, component: int) -> bool:
+        """Is it drawn from a diagram what is true of a component?"""
+        given = given_worlds(self._task)
+        listed = self._task.components[component].diagram is None
+        return not listed and (not given or any(each[component] is None for each in given))
 
     def tellings(self) -> Iterator[Telling]:
         """What the actions tell."""
@@ -341,3 +360,14 @@ class _World:
         """The variable that is the local one of a change."""
         facts = len(self._task.components[change.component].facts)
         return self._first[change.component] + variable if variable < facts else change.seen[variable - facts]
+
+
+def _walk(diagram: Diagram, first: int) -> Walk:
+    """How the facts of a component are drawn, whose variables stand from ``first`` on."""
+    diagrams = Diagrams(diagram.order, len(diagram.nodes) + 2)
+    diagrams.read(diagram)
+    turns = tuple(
+        Turn(level, chance, *(to - 2 if to > ONE else -1 for to in ends))
+        for level, chance, ends in diagrams.turns()
+    )
+    return Walk(tuple(first + place for place in diagram.order), turns)

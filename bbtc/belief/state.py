@@ -6,7 +6,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
-from bbtc.belief.draws import Draw, Values, compile_factor, product_of
+from bbtc.belief.draws import Draw, Values, add, compile_factor, product_of
 from bbtc.belief.hidden import compile_change, told_first
 from bbtc.ground.task import NO_CHANGE, ZERO, GroundAction, Task
 from bbtc.limits import Limits
@@ -100,8 +100,9 @@ def results_of(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> t
         for variable, value in delta:
             after[variable] = value
         key = (bytes(after), cost if extra is ZERO else cost + extra, reward)
-        merged[key] = merged[key] + probability if key in merged else probability
+        add(merged, key, probability)
     results = [Result(p, c, r, v) for (v, c, r), p in merged.items()]
     if len(results) > 1:
-        results.sort(key=lambda r: (-r.probability, r.values, r.cost, r.reward))
+        results.sort(key=lambda r: (r.values, r.cost, r.reward))
+        results.sort(key=lambda r: r.probability, reverse=True)
     return tuple(results)

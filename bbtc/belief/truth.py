@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from bbtc.belief.draws import Values, unbounded
-from bbtc.belief.hidden import Readings, belief_in, beliefs_of, case_of, number_in
+from bbtc.belief.hidden import Readings, beliefs_of, case_of, number_in
 from bbtc.ground.hidden.given import given_worlds
 from bbtc.ground.task import ONE, ZERO, Change, Task
 from bbtc.markov import distribution
@@ -46,7 +46,14 @@ class HiddenTruth:
         if not every:
             return None
         picked = self._pick(((number, ONE) for number in range(len(every))), "given")
-        return tuple(self._pick(found.items(), f"given:{at}") for at, found in enumerate(every[picked]))
+        return tuple(
+            beliefs.pick(beliefs.prior, self._point(f"given:{at}"))
+            if found is None
+            else self._pick(found.items(), f"given:{at}")
+            for at, (beliefs, found) in enumerate(
+                zip(map(beliefs_of, self.task.components), every[picked], strict=True)
+            )
+        )
 
     def begins(self, values: Values, worlds: Worlds) -> Fraction:
         """How much more probable an initial state is in these worlds than as far as is known, by what the
@@ -103,18 +110,20 @@ class HiddenTruth:
         ]
 
     def _drawn(self, values: Values, component: int, step: int) -> int:
-        belief = belief_in(self.task, values, component)
-        return self._pick(((world, Fraction(weight)) for world, weight in belief), f"{step}:{component}")
+        beliefs = beliefs_of(self.task.components[component])
+        return beliefs.pick(number_in(self.task, values, component), self._point(f"{step}:{component}"))
 
     def _pick(self, options: Iterable[tuple[int, Fraction]], what: str) -> int:
         listed = sorted(options)
-        point = Fraction(random.Random(f"{self.seed}:truth:{what}").getrandbits(64), 1 << 64)
-        point *= sum(weight for _, weight in listed)
+        point = self._point(what) * sum(weight for _, weight in listed)
         for world, weight in listed:
             point -= weight
             if point < 0:
                 return world
         return listed[-1][0]
+
+    def _point(self, what: str) -> Fraction:
+        return Fraction(random.Random(f"{self.seed}:truth:{what}").getrandbits(64), 1 << 64)
 
     def _options(
         self, action: str, change: Change, values: Values, worlds: Worlds, after: Values

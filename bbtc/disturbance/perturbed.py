@@ -8,6 +8,7 @@ one of its outcomes applies before the next change. The rules of a tick are thos
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 import random
 from bisect import bisect_right
@@ -44,11 +45,10 @@ class Draw:
     __slots__ = ("_bounds", "_count")
 
     def __init__(self, chances: Iterable[Fraction]) -> None:
-        total = Fraction(0)
-        self._bounds: list[int] = []
-        for chance in chances:
-            total += chance
-            self._bounds.append(threshold(total))
+        ratios = [chance.as_integer_ratio() for chance in chances]
+        scale = math.lcm(*(denominator for _, denominator in ratios))
+        sums = itertools.accumulate(numerator * (scale // denominator) for numerator, denominator in ratios)
+        self._bounds = [-((-total << _BITS) // scale) for total in sums]  # thresholds, rounded up
         self._count = len(self._bounds)
 
     def __call__(self, bits: int) -> int:

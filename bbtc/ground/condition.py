@@ -235,6 +235,34 @@ def evaluate(condition: Condition, state: Sequence[int]) -> Truth:
             assert_never(condition)
 
 
+def _least(tests: list[Callable[[Sequence[int]], int]]) -> Callable[[Sequence[int]], int]:
+    def least(state: Sequence[int]) -> int:
+        found = 2
+        for test in tests:
+            value = test(state)
+            if value < found:
+                if not value:
+                    return 0
+                found = value
+        return found
+
+    return least
+
+
+def _most(tests: list[Callable[[Sequence[int]], int]]) -> Callable[[Sequence[int]], int]:
+    def most(state: Sequence[int]) -> int:
+        found = 0
+        for test in tests:
+            value = test(state)
+            if value > found:
+                if value == 2:
+                    return 2
+                found = value
+        return found
+
+    return most
+
+
 def compile_condition(condition: Condition) -> Callable[[Sequence[int]], int]:
     """:func:`evaluate` as a closure that returns plain ints, for states read very often."""
     match condition:
@@ -247,11 +275,9 @@ def compile_condition(condition: Condition) -> Callable[[Sequence[int]], int]:
         case Known(variable):
             return lambda state: 0 if state[variable] == 1 else 2
         case And(parts):
-            tests = [compile_condition(p) for p in parts]
-            return lambda state: min([test(state) for test in tests], default=2)
+            return _least([compile_condition(p) for p in parts])
         case Or(parts):
-            tests = [compile_condition(p) for p in parts]
-            return lambda state: max([test(state) for test in tests], default=0)
+            return _most([compile_condition(p) for p in parts])
         case Not(part):
             test = compile_condition(part)
             return lambda state: 2 - test(state)

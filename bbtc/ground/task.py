@@ -12,6 +12,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal, TypeAlias
 
+from bbtc.diagrams import Diagram
 from bbtc.ground.condition import Condition
 from bbtc.kleene import Truth
 from bbtc.source import Span
@@ -160,7 +161,8 @@ class Component:
     """Hidden facts whose draws or changes depend on each other.
 
     A *world* is a truth value for each fact, as a number: bit i is set where fact i is true. ``prior`` has
-    every possible world with its probability. ``known`` are the task's variables that tell what is known.
+    every possible world with its probability; where these are too many, it is empty, and ``diagram`` has
+    weights of the worlds instead. ``known`` are the task's variables that tell what is known.
     ``first`` is what the robot is told before its first action; ``seen`` are the task's variables behind the
     facts in the local variables of that.
     """
@@ -170,6 +172,7 @@ class Component:
     known: tuple[Knowledge, ...]
     first: tuple[Observation, ...] = ()
     seen: tuple[int, ...] = ()
+    diagram: Diagram | None = None
 
     def local(self, task: Task, seen: Sequence[int]) -> tuple[Variable, ...]:
         """The local variables: a two-valued one for each fact, then the seen variables of the task."""

@@ -180,4 +180,6 @@ def _free(formula: Formula, bound: frozenset[str], found: dict[str, None]) -> No
             return
         case _:
             assert_never(formula)
-    found.update((term, None) for term in terms if is_parameter(term) and term not in bound)
+    for term in terms:
+        if is_parameter(term) and term not in bound:
+            found[term] = None

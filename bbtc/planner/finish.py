@@ -12,6 +12,7 @@ from bbtc.planner.best_tree import BestTree
 from bbtc.planner.guard import with_guards
 from bbtc.planner.objective import MORE_NODES, allowance
 from bbtc.planner.options import Options
+from bbtc.rewrite.left_to_guards import left_to_guards
 from bbtc.rewrite.retry import with_least_attempts
 from bbtc.rewrite.shrink import shrunk
 from bbtc.rewrite.simplify import numbered, simplified, size
@@ -50,6 +51,8 @@ def finish(
         # Branches that the simulation does not need help where others change the world.
         smallest = without_branches(best.target)
         smaller = smallest if size(root) > allowance(size(smallest)) else root
+    if not options.closed_world:
+        smaller = left_to_guards(task, smaller)
     if smaller is not root:
         root = taken(smaller)
     if options.retries == "least":

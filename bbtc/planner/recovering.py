@@ -54,6 +54,7 @@ from bbtc.planner.strong_cyclic.rules import certainly
 from bbtc.planner.strong_cyclic.sharing import Guarded, factored
 from bbtc.planner.synthesis.rules import Stated, literals_of, rule_size, separating
 from bbtc.rewrite.simplify import numbered, size
+from bbtc.rounding import rounded
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
 _NEAR = 1.5
@@ -177,7 +178,7 @@ def _choices(found: MaxProb, facts: ChangingFacts, limits: Limits) -> _Choices |
         assert cheapest is not None
     count = len(space.choice_action)
     weight = draw_probabilities(space)
-    rates = np.array([float(cost) for cost in costs] or [0.0])
+    rates = np.array([rounded(cost) for cost in costs] or [0.0])
     own = sums(space.edge_choice, weight * rates[space.edge_draw], count)
     onward = sums(space.edge_choice, weight * cheapest.values[space.edge_successor], count)
     values = cheapest.values[space.choice_state]

@@ -4,7 +4,7 @@ runtime=imported``, they import it from here. It needs py_trees (2.2 or later) a
 from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
-from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, watched
+from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -50,6 +50,7 @@ __all__ = [
     "Telling",
     "Try",
     "UntilSuccess",
+    "Walk",
     "When",
     "WithBeliefs",
     "WithSetup",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Protocol
 
@@ -206,9 +206,32 @@ class Telling:
         self.when = when
 
 
+class Walk:
+    """Facts that are drawn one after the other. A turn is the place of its fact, how likely that is true, and
+    the turns that come next if it is false, or true (-1: none); the last turn comes first. Facts that no turn
+    draws are as likely true as false."""
+
+    def __init__(self, facts: list[Fact], turns: list[tuple[int, str, int, int]]) -> None:
+        self.facts = facts
+        self.turns = turns
+
+    def __call__(self, rng: random.Random) -> State:
+        """What is true."""
+        state: State = {}
+        at = len(self.turns) - 1
+        for place, fact in enumerate(self.facts):
+            chance, following = "1/2", (at, at)
+            if at >= 0 and self.turns[at][0] == place:
+                chance, following = self.turns[at][1], self.turns[at][2:]
+            value = draw(rng, [(chance, True), (str(1 - Fraction(chance)), False)])
+            state[fact] = value
+            at = following[value]
+        return state
+
+
 class HiddenWorld(World):
-    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``,
-    and the robot is told no more than ``tellings`` say."""
+    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``, and one
+    after the other along ``walks``, and the robot is told no more than ``tellings`` say."""
 
     def __init__(
         self,
@@ -220,14 +243,19 @@ class HiddenWorld(World):
         priors: list[list[tuple[str, State]]],
         tellings: dict[Fact, list[Telling]],
         parts: list[Part],
+        walks: Iterable[Callable[[random.Random], State]] = (),
     ) -> None:
         super().__init__(initial, actions, rng, report)
+        hidden: State = {}
         for prior in priors:
             drawn: State = draw(rng, prior)
-            self._state.update(drawn)
+            hidden.update(drawn)
+        for walk in walks:
+            hidden.update(walk(rng))
+        self._state.update(hidden)
         self._tellings = tellings
         self.monitor = Monitor(parts, self._value)
-        truth = [in_words(fact) for prior in priors for fact in prior[0][1] if self._state[fact]]
+        truth = [in_words(fact) for fact, value in hidden.items() if value]
         report(f"the truth: {', '.join(truth) or 'nothing'}")
         self._listen()
 

@@ -66,14 +66,36 @@ class Sets:
     sets: tuple[tuple[int, Truth], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A draw of the variable at ``level`` of a walk, and the turns that follow if it is false, or true: -1
+    where all that comes later is as likely as not."""
+
+    level: int
+    true: Fraction
+    if_false: int
+    if_true: int
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """Variables that are drawn one after the other, beginning with the last of ``turns``. Those that no turn
+    draws are true with probability 1/2."""
+
+    variables: tuple[int, ...]
+    turns: tuple[Turn, ...]
+
+
 @dataclass(frozen=True)
 class Monitor:
     """What a robot needs to know what it knows, as far as the runs of a tree lead; and for the worlds that it
-    is tried in, what is true at the start, drawn for each of ``priors``, and what its actions tell."""
+    is tried in, what is true at the start, drawn for each of ``priors`` and ``walks``, and what its actions
+    tell."""
 
     parts: tuple[Part, ...]
     priors: tuple[tuple[Sets, ...], ...]
     tellings: tuple[Telling, ...]
+    walks: tuple[Walk, ...] = ()
 
     @cached_property
     def known(self) -> frozenset[int]:
@@ -93,7 +115,8 @@ class Monitor:
     @cached_property
     def drawn(self) -> frozenset[int]:
         """The variables that are drawn at the start."""
-        return frozenset(variable for prior in self.priors for variable, _ in prior[0].sets)
+        drawn = {variable for prior in self.priors for variable, _ in prior[0].sets}
+        return frozenset(drawn.union(*(walk.variables for walk in self.walks)))
 
     @cached_property
     def readings(self) -> dict[str, tuple[str, ...]]:

@@ -59,10 +59,11 @@ def is_weighed(component: Component) -> bool:
     return any(each.at_least < 1 for each in component.known)
 
 
-def prior_worlds(component: Component, weighed: bool) -> Possible:
+def prior_worlds(prior: Iterable[tuple[int, Fraction]], weighed: bool) -> Possible:
     """The worlds that are possible before anything is told."""
-    scale = lcm(*(p.denominator for _, p in component.prior)) if weighed else 1
-    return tuple((world, int(p * scale) if weighed else 1) for world, p in sorted(component.prior) if p)
+    likely = [(world, p) for world, p in sorted(prior) if p]
+    scale = lcm(*(p.denominator for _, p in likely)) if weighed else 1
+    return tuple((world, int(p * scale) if weighed else 1) for world, p in likely)
 
 
 def possible_worlds(mass: dict[int, Fraction], weighed: bool) -> Possible:

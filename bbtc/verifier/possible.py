@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, NoReturn, TypeAlias
 
 from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import Condition, conjuncts, evaluate, variables
 from bbtc.ground.task import Change, Task
 from bbtc.kleene import Truth
-from bbtc.limits import Limits
+from bbtc.limits import MOST_WORLDS, Limits
 from bbtc.verifier.happenings import (
     Outcome,
     Possible,
@@ -88,7 +88,9 @@ class _Explorer:
 
     def tables(self) -> Tables:
         """See :func:`tables_of`."""
-        waiting = [prior_worlds(self._component, self._weighed)]
+        if self._component.diagram is not None:
+            self._refuse(f"more than {MOST_WORLDS:,} worlds")
+        waiting = [prior_worlds(self._component.prior, self._weighed)]
         self._numbers[waiting[0]] = 0
         first: dict[tuple[int, _Values], dict[Shown, int]] = {}
         if self._component.first:
@@ -161,12 +163,14 @@ class _Explorer:
         if self._spent % 256 == 0:
             self._limits.check_time("writing down what may be known")
         if self._spent > MOST_ROWS:
-            raise BbtcError.single(
-                "BBT0430",
-                f"what may be known of {self._component.facts[0]}, and what depends on it, takes more than "
-                f"{MOST_ROWS:,} lines",
-                hint="`bbtc plan --bounds` needs no list of it",
-            )
+            self._refuse(f"more than {MOST_ROWS:,} lines")
+
+    def _refuse(self, much: str) -> NoReturn:
+        raise BbtcError.single(
+            "BBT0430",
+            f"what may be known of {self._component.facts[0]}, and what depends on it, takes {much}",
+            hint="`bbtc plan --bounds` needs no list of it",
+        )
 
 
 def _table(change: Change, found: Mapping[tuple[int, _Values], Mapping[Shown, int]]) -> Table:

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
-from itertools import product
+from itertools import islice, product
 from typing import NamedTuple, TypeAlias
 
 from typing_extensions import assert_never
 
 from bbtc.ground.condition import FALSE, TRUE, Condition, Is, Known, evaluate, replaced, variables
-from bbtc.ground.task import Change, Factor, Task
+from bbtc.ground.task import Change, Component, Factor, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
@@ -49,6 +49,7 @@ _ENDS = {Truth.TRUE: "success", Truth.FALSE: "failure", Truth.UNKNOWN: "blocked"
 _STEP = Command(None, YES, (), "")
 
 _Values: TypeAlias = tuple[int, ...]
+_Prior: TypeAlias = Sequence[tuple[int, Fraction]]
 
 
 class _State(NamedTuple):
@@ -65,8 +66,11 @@ class _State(NamedTuple):
 def space_of(task: Task, root: Node, limits: Limits) -> Space | None:
     """The chain of a tree for a task with hidden facts, with the labels of
     :func:`bbtc.verifier.chain.chain_of`; ``goal`` is where it is true in the world. None beyond
-    :data:`MOST_STATES`. Raises ``LimitReached``."""
-    runs = _Runs(task, root)
+    :data:`MOST_STATES`, or so many worlds. Raises ``LimitReached``."""
+    priors = [list(islice(_worlds(component), MOST_STATES + 1)) for component in task.components]
+    if any(len(prior) > MOST_STATES for prior in priors):
+        return None
+    runs = _Runs(task, root, priors)
     states: list[_State] = []
     number: dict[_State, int] = {}
 
@@ -110,11 +114,44 @@ def space_of(task: Task, root: Node, limits: Limits) -> Space | None:
     return Space(tuple(choices), named)
 
 
+def _worlds(component: Component) -> Iterator[tuple[int, Fraction]]:
+    """The worlds of the prior, with their probabilities; of a diagram, by all its paths."""
+    diagram = component.diagram
+    if diagram is None:
+        yield from component.prior
+        return
+    level = {place: number for number, place in enumerate(diagram.order)}
+    levels = [len(level)] * 2 + [level[node.place] for node in diagram.nodes]
+
+    def total(number: int, above: int) -> Fraction:
+        """The weight of a node's worlds by the facts after a level."""
+        return totals[number] * (1 << (levels[number] - above - 1))
+
+    totals = [_ZERO, _ONE]
+    for node in diagram.nodes:
+        above = level[node.place]
+        totals.append(sum((weight * total(to, above) for weight, to in (node.if_false, node.if_true)), _ZERO))
+    waiting = [(len(levels) - 1, -1, 0, _ONE / total(len(levels) - 1, -1))]
+    while waiting:
+        number, above, world, p = waiting.pop()
+        at = above + 1
+        if at < levels[number]:  # nothing is asked of the fact of this level
+            waiting += [(number, at, world | value << diagram.order[at], p) for value in (1, 0)]
+        elif at == len(level):
+            yield world, p
+        else:
+            node = diagram.nodes[number - 2]
+            for value, (weight, to) in ((1, node.if_true), (0, node.if_false)):
+                if weight and totals[to]:
+                    waiting.append((to, at, world | value << node.place, p * weight))
+
+
 class _Runs:
     """What happens next, state by state."""
 
-    def __init__(self, task: Task, root: Node) -> None:
+    def __init__(self, task: Task, root: Node, priors: Sequence[_Prior]) -> None:
         self._task = task
+        self._priors = priors
         self._weighed = [is_weighed(component) for component in task.components]
         self._root = root
         self._around: dict[str, tuple[ControlNode, ...]] = {}
@@ -154,8 +191,7 @@ class _Runs:
         """The first states, once the robot was told what it is told at first."""
         task = self._task
         priors = [
-            prior_worlds(component, weighed)
-            for component, weighed in zip(task.components, self._weighed, strict=True)
+            prior_worlds(prior, weighed) for prior, weighed in zip(self._priors, self._weighed, strict=True)
         ]
         at_first = [number for number, component in enumerate(task.components) if component.first]
         for initial in task.initial:
@@ -174,7 +210,7 @@ class _Runs:
         if not waiting:
             return None
         found = []
-        for picked in product(*(self._task.components[number].prior for number in waiting)):
+        for picked in product(*(self._priors[number] for number in waiting)):
             worlds, p = list(state.worlds), _ONE
             for number, (world, probability) in zip(waiting, picked, strict=True):
                 worlds[number], p = world, p * probability

@@ -79,6 +79,7 @@ _OBJECT = """
 """
 
 
+@cache
 def _task(text: str) -> Task:
     return compile_sources([SourceFile("words.pddl", text)], Report(), Limits())
 

@@ -43,9 +43,10 @@ def _wide(path: Path, parameters: int, objects: int, condition: str) -> Path:
 @pytest.mark.parametrize("text", ["(", ")", "()"])
 def test_200_megabytes_of_parentheses(tmp_path: Path, text: str) -> None:
     file = tmp_path / "parentheses.pddl"
-    with file.open("w") as out:
+    megabyte = text.encode() * (1_000_000 // len(text))
+    with file.open("wb") as out:
         for _ in range(200):
-            out.write(text * (1_000_000 // len(text)))
+            out.write(megabyte)
     done = _run("check", str(file))
     assert done.returncode == 1
     assert "BBT0005" in done.stderr

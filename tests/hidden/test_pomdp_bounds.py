@@ -88,6 +88,29 @@ def test_where_beliefs_read_alike_a_tree_counts() -> None:
 _MOST_BELIEFS = 60
 
 
+_HUT = """
+(define (domain hut)
+  (:predicates (whole) (day))
+  (:action open-shutter :observe (day) :effect (probabilistic 1/3 (not (whole))))
+  (:action feel :observe (whole)))
+(define (problem night) (:domain hut)
+  (:init (unknown (whole)) (unknown (day)))
+  (:goal (and (whole) (not (day)))))
+"""
+
+
+def test_all_counts_that_is_seen_beside_what_changes_unseen() -> None:
+    """To see whether it is night may break the fuse; both are as likely as not at first, and nothing mends
+    either: 1/2 by 1/2 by 2/3."""
+    task = compile_sources([SourceFile("hut.pddl", _HUT)], Report(), Limits())
+    assert task.endless_beliefs
+    found = task_value(task, Limits())
+    assert found.lower <= Fraction(1, 6) <= found.upper
+    assert float(found.upper - found.lower) < 1e-6
+    tree = plan_task(task, Fraction(1, 7), "policy", Limits(), lambda _: None).tree
+    assert tree.success_probability == Fraction(1, 6)
+
+
 def _compare(text: str, *, noise: bool) -> str:
     reference = HiddenText.of(text)
     if not reference.prior:

@@ -132,18 +132,3 @@ def test_facts_that_nothing_joins_are_components_of_their_own() -> None:
     assert [component.facts for component in task.components] == sorted(
         (f"open({name})",) for name in names.split()
     )
-
-
-def test_a_component_of_too_many_worlds_names_its_facts() -> None:
-    names = " ".join(f"c{number}" for number in range(13))
-    text = f"""(define (domain d) (:types t) (:predicates (p ?x - t) (done))
-      (:action look :observe (exists (?x - t) (p ?x)))
-      (:action end :precondition (exists (?x - t) (p ?x)) :effect (done)))
-    (define (problem x) (:domain d) (:objects {names} - t)
-      (:init {" ".join(f"(unknown (p {name}))" for name in names.split())}) (:goal (done)))"""
-    with pytest.raises(BbtcError) as caught:
-        task_of(text)
-    (error,) = caught.value.diagnostics
-    assert error.code == "BBT0415"
-    assert "`p(c0)`" in error.message
-    assert "4,096" in error.message

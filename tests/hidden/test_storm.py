@@ -41,7 +41,7 @@ def test_the_text_of_a_tree_is_worth_what_the_worlds_say() -> None:
             reference.mdp(60)
             task = task_of(text)
             tree = plan_task(task, None, "policy", Limits(states=500, nodes=40), lambda _: None).tree
-            runs = TreeOnBeliefs(reference, dumps(tree_to_json(tree)), formulas_of(task)).ends()
+            runs = TreeOnBeliefs(reference, dumps(tree_to_json(tree)), formulas_of(tree.task)).ends()
         except (BbtcError, LimitReached, TooLarge):
             return
         written = export_tree(tree, "prism", {}, Limits())

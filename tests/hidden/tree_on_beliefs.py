@@ -31,7 +31,7 @@ class Ends:
 class TreeOnBeliefs(TreeOnText):
     """A tree as JSON, the text of its problem, and which conditions its variables on formulas stand for."""
 
-    def __init__(self, lifted: HiddenText, text: str, formulas: Mapping[Fact, Any]) -> None:
+    def __init__(self, lifted: HiddenText, text: str, formulas: Mapping[Fact, tuple[Any, Fraction]]) -> None:
         super().__init__(lifted, text)
         self.text = lifted
         self.formulas = formulas
@@ -41,9 +41,9 @@ class TreeOnBeliefs(TreeOnText):
         worlds = [world for world, _ in belief]
         every = frozenset[Fact]().union(*worlds)
         found = {fact: 2 if all(fact in world for world in worlds) else 1 for fact in every}
-        for name, formula in self.formulas.items():
-            values = {self.value(formula, dict.fromkeys(world, 2)) for world in worlds}
-            found[name] = values.pop() if len(values) == 1 else 1
+        for name, (formula, enough) in self.formulas.items():
+            true = sum(p for world, p in belief if self.value(formula, dict.fromkeys(world, 2)) == 2)
+            found[name] = 2 if true >= enough else 0 if 1 - true >= enough else 1
         return found
 
     def tick(self, node: Node, point: Point, world: Mapping[Fact, int]) -> int | Node:
@@ -130,13 +130,15 @@ class TreeOnBeliefs(TreeOnText):
         return Point(belief, finished, frozenset(tries.items()))  # type: ignore[arg-type]
 
 
-def formulas_of(task: Task) -> dict[Fact, Any]:
-    """What the variables on formulas of a task stand for, as a written tree has it."""
-    found: dict[Fact, Any] = {}
+def formulas_of(task: Task) -> dict[Fact, tuple[Any, Fraction]]:
+    """What the variables on formulas of a tree's task stand for, as a written tree has it, and how probable
+    that has to be."""
+    found: dict[Fact, tuple[Any, Fraction]] = {}
     written: Any = task_to_json(task)
     for component in written.get("components", ()):
         for known in component["known"]:
             name, _, rest = known["variable"].removesuffix(")").partition("(")
             if known["variable"] not in component["facts"]:
-                found[(name, *rest.split(",")) if rest else (name,)] = known["condition"]
+                fact = (name, *rest.split(",")) if rest else (name,)
+                found[fact] = known["condition"], Fraction(known.get("at_least", 1))
     return found

@@ -70,14 +70,25 @@ ATTRIBUTES = sorted(
 @pytest.mark.parametrize("attribute", [*ATTRIBUTES, "ID"])
 @pytest.mark.parametrize("nodes", PROFILES)
 def test_an_attribute_is_refused_by_its_name_and_line(nodes: str, attribute: str) -> None:
-    # In all places at once, which is quick; where one is not named then, without those that are, and alone.
-    left = [*places(nodes)]
-    while left and (found := named(nodes, attribute, left)):
-        left = [number for number in left if number not in found]
+    # In all places at once, which is quick; where one is not named then, with those of its tag, and alone.
+    tags = [element.tag for element in elements(parsed(FILES[nodes]))]
+    left = not_named(nodes, attribute, [*places(nodes)])
+    left = [
+        number
+        for tag in dict.fromkeys(tags[number] for number in left)
+        for number in not_named(nodes, attribute, [number for number in left if tags[number] == tag])
+    ]
     if left and not are_unread_ports(nodes, attribute, left):
         for number in left:
             if not named(nodes, attribute, [number]):
                 check_port(nodes, attribute, number)
+
+
+def not_named(nodes: str, attribute: str, numbers: list[int]) -> list[int]:
+    """The places where an attribute is not refused by its name, even without those where it is."""
+    while numbers and (found := named(nodes, attribute, numbers)):
+        numbers = [number for number in numbers if number not in found]
+    return numbers
 
 
 def with_attribute(nodes: str, attribute: str, numbers: list[int]) -> tuple[str, list[ET.Element]]:

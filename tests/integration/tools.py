@@ -28,6 +28,10 @@ def recipe(name: str) -> str:
 def tool(name: str) -> str:
     """The path of a program: of this environment, else of the PATH; skips the test where there is none."""
     beside = Path(sys.executable).with_name(name)
+    if beside.exists() and name == "cmake":
+        import cmake
+
+        beside = Path(cmake.CMAKE_BIN_DIR, name)  # what the script beside us runs, once it has loaded itself
     found = str(beside) if beside.exists() else shutil.which(name)
     if found is None:
         pytest.skip(f"{name} is not installed")

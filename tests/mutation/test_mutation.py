@@ -92,7 +92,8 @@ def test_a_mutant_dies_survives_or_runs_out_of_time_as_its_tests_say(toy: Projec
 
 
 def test_what_never_ends_is_ended_and_counts_as_noticed(toy: Project) -> None:
-    source = "def steps(n):\n    while n > 0:\n        n -= 1\n    return n\n"
+    loop = "    while n > 0:\n        n -= 1\n        time.sleep(0.01)\n"  # endless, but not busy
+    source = f"import time\ndef steps(n):\n{loop}    return n\n"
     (toy.root / "toy/sums.py").write_text(source)
     (toy.root / "tests/test_sums.py").write_text(
         "from toy.sums import steps\n\ndef test(): assert steps(2) == 0\n"

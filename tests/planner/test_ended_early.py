@@ -22,6 +22,7 @@ from bbtc.limits import PLANNING_SECONDS, Limits, Stage
 from bbtc.pipeline import compile_sources, plan_task, simulate_tree
 from bbtc.planner.options import DEFAULTS, Options
 from bbtc.source import SourceFile
+from tests.cli import program
 from tests.conftest import REPOSITORY
 from tests.long_form import LONG
 
@@ -175,10 +176,7 @@ def test_more_signals_do_not_keep_the_tree_from_being_written(endless: list[str]
 
 def test_a_time_limit_ends_the_program_with_a_tree(endless: list[str]) -> None:
     started_at = time.monotonic()
-    done = subprocess.run(
-        [sys.executable, "-m", "bbtc.cli.main", *endless, "-q", "--time-limit", "1", "--strategy", "refine"],
-        capture_output=True, text=True, check=False, cwd=REPOSITORY, timeout=300,
-    )  # fmt: skip
+    done = program.bbtc(*endless, "-q", "--time-limit", "1", "--strategy", "refine")
     assert done.returncode == 3, done.stderr
     assert "the time limit of 1 s ended" in done.stderr
     assert json.loads(Path(endless[-1]).read_text())["status"] == "limit-reached"

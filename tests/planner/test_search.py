@@ -67,7 +67,7 @@ def test_an_insertion_that_leads_into_a_dead_end_is_backed_out_of() -> None:
 def test_an_insertion_that_leads_into_a_dead_end_will_do_where_the_target_allows() -> None:
     jump = action("jump", Is(1, F), ("0.8", {0: T}), ("0.2", {1: T}))
     done = plan(task("across fallen", {}, Is(0, T), jump), "0.8")
-    assert (done.tree.status, size(done.tree.root)) == ("target-reached", 5)
+    assert (done.tree.status, size(done.tree.root)) == ("target-reached", 3)
     assert done.tree.success_probability == Fraction("0.8")
 
 

@@ -20,7 +20,7 @@ from bbtc.belief.soundness import violations
 from bbtc.belief.state import compile_action, initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick
 from bbtc.diagnostics import BbtcError
-from bbtc.ground.condition import Is, Known, conjunction, conjuncts, evaluate, leaves
+from bbtc.ground.condition import TRUE, And, Is, Known, Or, conjunction, conjuncts, evaluate, leaves
 from bbtc.ground.task import InitialState, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -46,8 +46,12 @@ from tests.conftest import REPOSITORY
 from tests.ground.examples import task_of
 from tests.long_form import amount
 from tests.planner.strong_cyclic_reference import strong_cyclic_states
+from tests.planner.test_refine import action as acting
+from tests.planner.test_refine import task
 from tests.profiles import examples
 from tests.strategies import nodes, tasks
+
+T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
 
 
 def plan(of: Task, limits: Limits | None = None) -> Plan:
@@ -147,6 +151,20 @@ def test_the_quotient_of_any_tree_without_memory_has_the_figures_of_its_chain(da
     quotient = quotient_chain(of, root, Limits(), solver.model, solver.exclusion)
     whole, small = figures(of, root, chain), figures(of, root, quotient)
     assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
+
+
+def test_a_contradiction_of_what_is_unknown_is_unknown_in_the_quotient_too() -> None:
+    """A tree that waits for it is blocked, and does not fail."""
+    of = task("seen lit", {0: U, 1: T}, Is(0, T), acting("look", TRUE, ("1", {0: T})))
+    of = replace(of, variables=(of.variables[0], replace(of.variables[1], three_valued=False)))
+    root = ConditionNode("n1", Or((Is(1, F), And((Is(0, T), Is(0, F))))))
+    solver = Solver(of, Limits())
+    for chain in (
+        explore(of, root, Limits()),
+        quotient_chain(of, root, Limits(), solver.model, solver.exclusion),
+    ):
+        found = figures(of, root, chain)
+        assert (found.blocked, found.failure) == (1, 0)
 
 
 @examples(amount(100, 5000))

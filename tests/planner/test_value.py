@@ -12,10 +12,10 @@ from hypothesis import assume, given
 
 from bbtc.belief.draws import Values
 from bbtc.diagnostics import BbtcError, LimitReached
-from bbtc.ground.condition import And, Is
+from bbtc.ground.condition import TRUE, And, Is
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
-from bbtc.limits import Limits
+from bbtc.limits import Effort, Limits
 from bbtc.markov import solve
 from bbtc.planner.mdp.bounded_search import search_bounds
 from bbtc.planner.mdp.explore import explore_space
@@ -257,6 +257,16 @@ def test_policy_iteration_leaves_a_poor_policy_for_the_best() -> None:
     values = Equations(found.graph, part, found.prob_1).solve(shortest, Limits())
     assert values == [Fraction(9, 10)] * int(part.sum())
     assert shortest[start] == found.policy[start]
+
+
+def test_what_hardly_ever_ends_costs_what_it_costs_and_takes_little_work() -> None:
+    """In floats it never ends, and a search in floats would go on to its last sweep."""
+    chance = Fraction(1, 10**20)
+    of = task("open", {}, Is(0, T), action("try", TRUE, (str(chance), {0: T}), (str(1 - chance), {})))
+    limits = Limits(effort=Effort(200))
+    cheapest = least_cost(max_prob(explore_space(of, limits), limits), limits)
+    assert cheapest is not None
+    assert (cheapest.initial, cheapest.exact) == (10**20, True)
 
 
 def test_a_task_whose_goal_nothing_reaches_has_the_value_0_and_costs_nothing() -> None:

@@ -35,6 +35,8 @@ from bbtc.tree.monitor import FIRST, Monitor
 from bbtc.tree.nodes import Tree
 from tests.belief.hidden_tasks import search, tiger
 from tests.domains.problems import PROBLEMS, tree_of
+from tests.ground.examples import task_of
+from tests.hidden.test_diagram_beliefs import gates
 from tests.hidden.texts import texts
 from tests.long_form import amount
 from tests.profiles import examples
@@ -115,6 +117,7 @@ HAND_MADE = {
     "ward": (compiled(WARD), HALF),
     "boxes": (compiled(BOXES), HALF),
     "clinic": (compiled(CLINIC), HALF),
+    "gates": (task_of(gates(4), Limits(worlds=0)), Fraction(1)),
 }
 
 

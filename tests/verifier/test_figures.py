@@ -81,7 +81,7 @@ def test_random_trees_that_try_again(first: int) -> None:
             assert disagreements(tree, found) == {}, (seed, form, most)
 
 
-@examples(amount(60, 3000))
+@examples(amount(120, 3000))
 @given(tree=trees())
 def test_trees_on_tasks_with_every_construct(tree: Tree) -> None:
     """Chance in chance, several factors, conditional effects, costs and rewards of outcomes."""

@@ -13,7 +13,7 @@ from bbtc.backends.world_model import actions_used, changes_of, initial_values, 
 from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Factor, Outcome
 from bbtc.kleene import Truth
-from bbtc.tree.monitor import Monitor, Telling
+from bbtc.tree.monitor import Monitor, Telling, Walk
 from bbtc.tree.nodes import Tree
 
 _VALUES = {Truth.TRUE: "Truth::True", Truth.FALSE: "Truth::False", Truth.UNKNOWN: "Truth::Unknown"}
@@ -112,6 +112,7 @@ class SimulatedRobotWriter:
                 for weight, each in zip(weights, prior, strict=True)
             )
             priors.append(_rows(list(draws)))
+        walks = f",\n      /*walks=*/{_rows(list(map(self._walk, monitor.walks)))}" if monitor.walks else ""
         by_action: dict[str, list[str]] = {}
         for telling in monitor.tellings:
             by_action.setdefault(telling.action, []).append(self._telling(telling))
@@ -124,12 +125,24 @@ class SimulatedRobotWriter:
                 "inline const HiddenModel& hidden() {",
                 "  static const HiddenModel all = {",
                 f"      /*priors=*/{_rows(priors)},",
-                f"      /*tellings=*/{_rows(tellings)}}};",
+                f"      /*tellings=*/{_rows(tellings)}{walks}}};",
                 "  return all;",
                 "}",
                 "",
             ]
         )
+
+    def _walk(self, walk: Walk) -> str:
+        turns = []
+        for turn in walk.turns:
+            # What is certain is not rounded to something that may happen.
+            sure = turn.true in (0, 1)
+            true, false = (
+                (int(turn.true), int(1 - turn.true)) if sure else cppcode.weights((turn.true, 1 - turn.true))
+            )
+            following = f"{{{turn.if_false}, {turn.if_true}}}"
+            turns.append(f"{{{turn.level}, {{{false}u, {true}u}}, {following}}}")
+        return braces([braces(str(self._number[at]) for at in walk.variables), _rows(turns)])
 
     def _telling(self, telling: Telling) -> str:
         observation = telling.observation

@@ -99,7 +99,7 @@ class _Writer:
         root_kind = "StopWhenBlocked" if self.monitor is None else "StopOutside"
         body = layout(call(root_kind, "robot", self._code(self.root, 1), "READS"), "return ", level=1)
         root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *body]
-        trees, main = [*self.branches, root], (_MAIN if self.monitor is None else _MAIN_HIDDEN).splitlines()
+        trees, main = [*self.branches, root], self._main().splitlines()
         tables = [self._reads(), *self.world.tables()]
         # Without the methods of the robots, whose parameters may be named like anything.
         used = {"Fact", "Protocol", "Status", "run"}
@@ -116,6 +116,12 @@ class _Writer:
         for block in [self._protocol(), *nodes, *trees, *world, *tables, self.world.world(), main]:
             lines += ["", "", *block]
         return "\n".join(lines) + "\n"
+
+    def _main(self) -> str:
+        if self.monitor is None:
+            return _MAIN
+        walks = ", walks=WALKS" if self.monitor.walks else ""
+        return _MAIN_HIDDEN.replace("parts=MONITOR", f"parts=MONITOR{walks}")
 
     def _docstring(self) -> list[str]:
         problem, domain = harmless(self.task.problem), harmless(self.task.domain)

@@ -9,7 +9,7 @@ from bbtc.backends.pytrees.pycode import Code, Prefixed, call, layout, literal, 
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
-from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Telling
+from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Telling, Walk
 
 VALUES = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
 
@@ -33,6 +33,13 @@ class MonitorWriter:
         for telling in self._monitor.tellings:
             by_action.setdefault(telling.action, []).append(self._telling(telling))
         tellings = mapping((self.action(name), sequence(each)) for name, each in by_action.items())
+        walks = sequence(map(self._walk, self._monitor.walks))
+        more = [
+            [
+                *layout(walks, "WALKS: list[Walk] = "),
+                '"""What may be true at the start, drawn one after the other."""',
+            ]
+        ]
         return [
             [
                 *layout(parts, "MONITOR: list[Part] = "),
@@ -46,6 +53,7 @@ class MonitorWriter:
                 *layout(tellings, "TELLINGS: dict[Fact, list[Telling]] = "),
                 '"""What each action tells."""',
             ],
+            *(more if self._monitor.walks else []),
         ]
 
     def action(self, name: str) -> str:
@@ -82,6 +90,13 @@ class MonitorWriter:
         if observation.when is not None:
             items.append(self._test(observation.when))
         return call("Telling", *items)
+
+    def _walk(self, walk: Walk) -> Code:
+        turns = (
+            call("", str(turn.level), literal(str(turn.true)), str(turn.if_false), str(turn.if_true))
+            for turn in walk.turns
+        )
+        return call("Walk", sequence(map(self._fact, walk.variables)), sequence(turns))
 
     def _test(self, condition: Condition) -> Code:
         return Prefixed("lambda s: ", self._conditions.write(condition, lambda at: f"s[{self._fact(at)}]"))

@@ -8,8 +8,10 @@ from fractions import Fraction
 
 from bbtc.collector import collector_paused
 from bbtc.diagnostics import BbtcError, Report
+from bbtc.diagrams import Diagram, TooManyNodes
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, compile_condition, variables
+from bbtc.ground.condition_diagram import diagrams_of
 from bbtc.ground.hidden.changes import Local, act, divided, join, read_after, telling
 from bbtc.ground.hidden.derived_tests import with_asked
 from bbtc.ground.hidden.failing import may_fail
@@ -17,15 +19,16 @@ from bbtc.ground.hidden.given import contradicts
 from bbtc.ground.hidden.groups import Groups
 from bbtc.ground.hidden.knowledge import KnownConditions, TooManyCases
 from bbtc.ground.hidden.naming import formula_names
-from bbtc.ground.hidden.parts import Setting, all_settings, effects_of, settings_of
+from bbtc.ground.hidden.parts import Setting, all_settings, effects_of, facts_of, settings_of
 from bbtc.ground.hidden.physical import Draw, Physical, physical
+from bbtc.ground.hidden.priors import Said, prior_diagram
 from bbtc.ground.hidden.relevance import relevant
 from bbtc.ground.hidden.uncertain import hidden_facts
 from bbtc.ground.hidden.worlds import TooManyWorlds, Worlds, given_true
 from bbtc.ground.renumber import reordered
 from bbtc.ground.start import contradicted
 from bbtc.kleene import Truth
-from bbtc.limits import MOST_WORLDS, Limits
+from bbtc.limits import Limits
 from bbtc.model import domain as md
 from bbtc.rounding import short_text
 from bbtc.source import Span
@@ -157,7 +160,10 @@ class _Compiler:
             try:
                 empty = worlds.contradict()
             except TooManyWorlds:
-                continue
+                local = Local(facts)
+                holds = [local.condition(condition) for condition, _ in said]
+                start = Said({fact: local.variable(fact) for fact in facts}, {}, mine, holds)
+                empty = self._diagram(start, [self._name(fact) for fact in facts], ()) is None
             if empty:
                 contradicted(self._report, (said[0][1] if said else None) or self._model.init.span)
 
@@ -180,7 +186,11 @@ class _Compiler:
         )
         asked = set(_asked(made))
         self._assign()
-        components = [self._component(each, read.knowledge, asked) for each in facts.values()]
+        together = _read_together(made, [len(each) for each in facts.values()])
+        components = [
+            self._component(each, read.knowledge, asked, together[number])
+            for number, each in enumerate(facts.values())
+        ]
         self._report.raise_errors()
         values = [*self._found.start, *[Truth.UNKNOWN] * len(read.knowledge.formulas)]
         for number, (condition, _) in self._thresholds.items():
@@ -326,31 +336,32 @@ class _Compiler:
         args = (*variable.args, short_text(threshold.at_least))
         return replace(variable, predicate=called, args=args)
 
-    def _component(self, facts: Sequence[int], knowledge: KnownConditions, asked: set[int]) -> gt.Component:
+    def _component(
+        self,
+        facts: Sequence[int],
+        knowledge: KnownConditions,
+        asked: set[int],
+        together: Iterable[Sequence[int]],
+    ) -> gt.Component:
         self._limits.check_time("listing worlds")
         mine, start = set(facts), self._found.start
         leader = self._groups.of(facts[0])
         draws, clauses = self._draws_of.get(leader, []), self._clauses_of.get(leader, [])
         given = {fact: start[fact] is Truth.TRUE for fact in facts if fact not in self._found.uncertain}
-        names = [self._found.task.variables[fact].name for fact in facts]
+        names = list(map(self._name, facts))
+        local = Local(facts)
+        diagram = None
         try:
             prior = Worlds(facts, given, draws, [each for each, _ in clauses], self._limits).all()
         except TooManyWorlds:
-            listed = ", ".join(f"`{name}`" for name in names[:_MOST_NAMED])
-            more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-            self._report.error(
-                "BBT0415",
-                f"the hidden facts {listed}{more} depend on each other and have more than "
-                f"{MOST_WORLDS:,} worlds",
-                self._model.init.span or self._model.problem_span,
-                "facts that no draw, condition, effect or observation joins are tracked apart",
-            )
-            prior = {0: Fraction(1)}
-        if not prior:
+            prior = {}
+            places = {fact: local.variable(fact) for fact in facts}
+            holds = [local.condition(each) for each, _ in clauses]
+            diagram = self._diagram(Said(places, given, draws, holds), names, together)
+        if not prior and diagram is None:
             spans = [span for _, span in clauses if span is not None]
             contradicted(self._report, spans[0] if spans else self._model.init.span)
             prior = {0: Fraction(1)}
-        local = Local(facts)
         known = [gt.Knowledge(fact, local.condition(Is(fact, Truth.TRUE))) for fact in facts if fact in asked]
         known += [
             gt.Knowledge(number, local.condition(formula))
@@ -364,7 +375,27 @@ class _Compiler:
             if mine.issuperset(variables(condition))
         ]
         first = tuple(map(local.observation, self._first_of.get(leader, ())))
-        return gt.Component(tuple(names), tuple(prior.items()), tuple(known), first, tuple(local.seen))
+        return gt.Component(
+            tuple(names), tuple(prior.items()), tuple(known), first, tuple(local.seen), diagram
+        )
+
+    def _name(self, variable: int) -> str:
+        return self._found.task.variables[variable].name
+
+    def _diagram(self, said: Said, names: Sequence[str], together: Iterable[Sequence[int]]) -> Diagram | None:
+        """The prior of a component with too many worlds to be listed; None if there is no world."""
+        try:
+            return prior_diagram(said, together, self._limits)
+        except TooManyNodes:
+            listed = ", ".join(f"`{name}`" for name in names[:_MOST_NAMED])
+            more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+            raise BbtcError.single(
+                "BBT0415",
+                f"the hidden facts {listed}{more} depend on each other in too many ways: what is known of "
+                f"them takes more than {self._limits.diagram_nodes:,} nodes of a decision diagram",
+                self._model.init.span or self._model.problem_span,
+                "facts that no draw, condition, effect or observation joins are tracked apart",
+            ) from None
 
 
 def _odds(draws: Iterable[Draw]) -> Iterator[tuple[int, Fraction]]:
@@ -376,19 +407,42 @@ def _odds(draws: Iterable[Draw]) -> Iterator[tuple[int, Fraction]]:
             yield variable, sum((weight for weight, true in draw.branches if true), Fraction(0)) / whole
 
 
+def _read_together(task: gt.Task, sizes: Sequence[int]) -> list[dict[tuple[int, ...], None]]:
+    """By component: the local facts that an observation reads, or an action's effects read and set."""
+    found: list[dict[tuple[int, ...], None]] = [{} for _ in sizes]
+    for action in task.actions:
+        for change in action.changes:
+            read = [read_after([each]) for each in change.observations]
+            read.append(set().union(*map(facts_of, change.factors)))
+            for each in read:
+                found[change.component][tuple(sorted(at for at in each if at < sizes[change.component]))] = (
+                    None
+                )
+    return found
+
+
 def _known_at_first(component: gt.Component) -> Iterator[tuple[int, Truth]]:
     """What the prior tells."""
+    for each, chance in zip(component.known, _chances(component), strict=True):
+        if chance >= each.at_least:
+            yield each.variable, Truth.TRUE
+        else:
+            yield each.variable, Truth.FALSE if 1 - chance >= each.at_least else Truth.UNKNOWN
+
+
+def _chances(component: gt.Component) -> Iterator[Fraction]:
+    """How likely each condition is of which something is known."""
+    if component.diagram is not None:
+        diagrams = diagrams_of(component)
+        yield from (Fraction(*diagrams.share(diagrams.prior, each.condition)) for each in component.known)
+        return
     worlds = [
         (bytes(2 * (world >> place & 1) for place in range(len(component.facts))), probability)
         for world, probability in component.prior
     ]
     for each in component.known:
         value = compile_condition(each.condition)
-        chance = sum((p for world, p in worlds if value(world) == Truth.TRUE), Fraction(0))
-        if chance >= each.at_least:
-            yield each.variable, Truth.TRUE
-        else:
-            yield each.variable, Truth.FALSE if 1 - chance >= each.at_least else Truth.UNKNOWN
+        yield sum((p for world, p in worlds if value(world) == Truth.TRUE), Fraction(0))
 
 
 def _asked(task: gt.Task) -> Iterator[int]:

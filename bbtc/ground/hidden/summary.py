@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from bbtc.ground.condition_diagram import diagrams_of
 from bbtc.ground.task import Component, Task
 
 _MOST_COMPONENTS = 8
@@ -19,9 +20,16 @@ def hidden_summary(task: Task) -> Iterator[str]:
     grouped = f"{_counted(facts, 'hidden fact')} in {_counted(len(components), 'component')}"
     yield f"{task.domain}/{task.problem}: {grouped}"
     for component in components[:_MOST_COMPONENTS]:
-        yield f"  {_facts(component)}: {_counted(len(component.prior), 'world')}"
+        yield f"  {_facts(component)}: {_counted(_worlds(component), 'world')}"
     if len(components) > _MOST_COMPONENTS:
         yield f"  and {len(components) - _MOST_COMPONENTS} more"
+
+
+def _worlds(component: Component) -> int:
+    if component.diagram is None:
+        return len(component.prior)
+    found = diagrams_of(component)
+    return found.diagrams.count(found.prior)
 
 
 def _facts(component: Component) -> str:

@@ -21,9 +21,10 @@ from bbtc.ground.condition import (
 )
 from bbtc.ground.hidden.physical import Draw
 from bbtc.kleene import Truth
-from bbtc.limits import MOST_WORLDS, Limits
+from bbtc.limits import Limits
 
-_MOST_STEPS = 100 * MOST_WORLDS
+_MOST_STEPS = 100
+"""So many steps are taken to find a world."""
 
 Branches: TypeAlias = tuple[tuple[Fraction, frozenset[int]], ...]
 
@@ -77,7 +78,7 @@ class Worlds:
         found: dict[int, Fraction] = {}
         for world, weight in self._listed():
             found[world] = found.get(world, Fraction(0)) + weight
-            if len(found) > MOST_WORLDS:
+            if len(found) > self._limits.worlds:
                 raise TooManyWorlds
         whole = sum(found.values(), Fraction(0))
         return {world: weight / whole for world, weight in sorted(found.items())}
@@ -88,7 +89,7 @@ class Worlds:
 
     def _listed(self) -> Iterator[tuple[int, Fraction]]:
         alone = [place for place, (draws, clauses) in enumerate(self._of_fact) if not draws and not clauses]
-        if 2 ** (len(alone) - len(self._given)) > MOST_WORLDS:
+        if 2 ** (len(alone) - len(self._given)) > self._limits.worlds:
             raise TooManyWorlds
         values = bytearray([Truth.UNKNOWN]) * len(self._place)
         active = [branches for _, branches in self._draws]
@@ -104,7 +105,7 @@ class Worlds:
         while stack:
             values, active = stack.pop()
             steps += 1
-            if steps > _MOST_STEPS:
+            if steps > _MOST_STEPS * self._limits.worlds:
                 raise TooManyWorlds
             if steps % 256 == 0:
                 self._limits.check_time("listing worlds")

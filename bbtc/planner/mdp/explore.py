@@ -64,6 +64,8 @@ class Explorer:
         self.task = task
         self.packing = Packing.of(task)
         self.tables = ActionTables(task, self.packing, limits)
+        self._by_reference = np.zeros(len(task.actions), dtype=np.bool_)
+        self._by_reference[list(self.tables.by_reference)] = True
         self.table = StateTable(self.packing.words)
         self._goal_test: BitTest = bit_test(self.packing, task.goal)
         self._goal = _Column(np.bool_)
@@ -175,7 +177,7 @@ class Explorer:
         simulator runs them."""
         owners, numbers, packed = [], [], []
         values = self.packing.values(states)
-        for choice in np.flatnonzero(np.isin(actions, list(self.tables.by_reference))).tolist():
+        for choice in np.flatnonzero(self._by_reference[actions]).tolist():
             for bits, number in self.tables.reference_results(values[rows[choice]], int(actions[choice])):
                 owners.append(choice)
                 numbers.append(number)

@@ -36,6 +36,8 @@ MOST_STARTS = 10_000
 def fully_observable(task: Task) -> Task | None:
     """The task in which all is seen; None where there are too many worlds to begin in, and where effects read
     what is known: to see more might then do less."""
+    if any(component.diagram is not None for component in task.components):
+        return None
     starts = prod((len(component.prior) for component in task.components), start=len(task.initial))
     return None if starts > MOST_STARTS or reads_knowledge(task) else _Seeing(task).task()
 

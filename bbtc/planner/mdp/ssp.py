@@ -25,6 +25,7 @@ from bbtc.rounding import rounded
 _ZERO = Fraction(0)
 _MOST_EXACT = 100_000  # choices of a system that is solved in rationals
 _MOST_SWEEPS = 100_000
+_SAME_SWEEPS = 1_000  # that change values by the same: so do all that follow
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +88,15 @@ def _float_values(equations: Equations, policy: Number, limits: Limits) -> Float
         equations.update,
     ]
     for update in updates:
+        change, same = np.zeros(len(own)), 0
         for step in range(_MOST_SWEEPS):
             before, values = values, update(values)
-            if np.abs(values - before).max() < 1e-13 * max(1.0, float(np.abs(values).max())):
+            last, change = change, values - before
+            if np.abs(change).max() < 1e-13 * max(1.0, float(np.abs(values).max())):
+                break
+            # What ends with a chance too small for floats never ends in them.
+            same = same + 1 if np.array_equal(change, last) else 0
+            if same == _SAME_SWEEPS:
                 break
             if step % 64 == 0:
                 limits.check_time("the search for the least cost")

@@ -111,7 +111,8 @@ class ActionTables:
     """Actions with too many joint outcomes, or that change what is believed, as the simulator runs them."""
     _charges: dict[int, tuple[tuple[BitTest, Charge], ...]] = field(init=False, default_factory=dict)
     """By outcome: what it adds to cost and reward under conditions."""
-    _draw_index: dict[Draw, int] = field(init=False, default_factory=dict)
+    _draw_index: dict[tuple[tuple[int, int], ...], int] = field(init=False, default_factory=dict)
+    """By the figures as ratios, whose hashes take little time."""
 
     def __post_init__(self) -> None:
         self._compile_preconditions()
@@ -222,15 +223,15 @@ class ActionTables:
             charges = [charge for flag, (_, charge) in zip(flags, tests, strict=True) if flag]
             cost = sum((charge.cost for charge in charges), own.cost)
             reward = sum((charge.reward for charge in charges), own.reward)
-            made.append(self.draw_number(Draw(own.probability, cost, reward)))
+            made.append(self._draw_number(own.probability, cost, reward))
         return np.array([made[each] for each in kind.reshape(-1).tolist()], dtype=np.int64)
 
-    def draw_number(self, draw: Draw) -> int:
+    def _draw_number(self, probability: Fraction, cost: Fraction, reward: Fraction) -> int:
         """The number of an outcome's figures in :attr:`draws`."""
-        number = self._draw_index.get(draw)
-        if number is None:
-            number = self._draw_index[draw] = len(self.draws)
-            self.draws.append(draw)
+        ratios = (probability.as_integer_ratio(), cost.as_integer_ratio(), reward.as_integer_ratio())
+        number = self._draw_index.setdefault(ratios, len(self.draws))
+        if number == len(self.draws):
+            self.draws.append(Draw(probability, cost, reward))
         return number
 
     # --- use -----------------------------------------------------------------------------------
@@ -325,9 +326,8 @@ class ActionTables:
     def reference_results(self, values: Values, action: int) -> Iterator[tuple[int, int]]:
         """Packed state and number of the figures of each result of an action with very many
         joint outcomes, as the simulator computes them."""
-        for result in self.by_reference[action](values):
-            draw = Draw(result.probability, result.cost, result.reward)
-            yield self.packing.pack(result.values), self.draw_number(draw)
+        for probability, cost, reward, after in self.by_reference[action](values):
+            yield self.packing.pack(after), self._draw_number(probability, cost, reward)
 
 
 def _joint(factors: tuple[Factor, ...]) -> dict[_Joint, Fraction] | None:

@@ -273,8 +273,9 @@ class _Ticks:
     def _condition(self, condition: Condition) -> _Tick:
         packing, reasons = self.model.packing, self.model.reasons
         true, false = bit_test(packing, condition), bit_test(packing, condition, False)
+        # What has to be so for it to be true may say nothing of a fact that makes it unknown: `p and not p`.
         if isinstance(true, Cube) and not any(
-            packing.unknown[packing.owner(bit)] is not None for bit in set_bits(true.mask)
+            self.task.variables[variable].three_valued for variable in variables(condition)
         ):
             return self._conjunction(true)
 

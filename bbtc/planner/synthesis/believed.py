@@ -16,7 +16,8 @@ from fractions import Fraction
 from itertools import combinations
 from typing import TypeAlias
 
-from bbtc.belief.hidden import Beliefs, beliefs_of
+from bbtc.belief.hidden import beliefs_of
+from bbtc.belief.worlds.beliefs import Beliefs
 from bbtc.ground.condition import Condition, Is, conjunction
 from bbtc.ground.task import Component, InitialState, Knowledge, Task, Variable, split_name
 from bbtc.kleene import Truth

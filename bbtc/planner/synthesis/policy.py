@@ -18,6 +18,7 @@ from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.best_tree import BestTree
 from bbtc.planner.finish import GRACE, finish
+from bbtc.planner.guard import with_guards
 from bbtc.planner.mdp.bounded_search import Advice
 from bbtc.planner.mdp.finite_horizon import Horizon
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb
@@ -104,7 +105,9 @@ class _Search:
         enough = min(self.target, found.initial.lower) - _ALLOWANCE
         parts = by_count(found.space, found.policy, float(enough), limits)
         with suppress(LimitReached):
-            self._keep(in_phases(self.task, [(part.steps, part.policy) for part in parts], limits), limits)
+            root = in_phases(self.task, [(part.steps, part.policy) for part in parts], limits)
+            # Where a state was given up, it reads like others, in which the action is right.
+            self._keep(with_guards(self.task, root), limits)
 
     def _cheapest(self, found: MaxProb, limits: Limits) -> MultiPolicy:
         """The cheapest of the best policies, or one of the best if there is no time to find it."""

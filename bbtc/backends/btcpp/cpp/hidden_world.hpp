@@ -2,6 +2,7 @@
 // edit it.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -32,10 +33,25 @@ struct Draw {
   std::vector<std::pair<std::size_t, Truth>> facts;
 };
 
-/// What may be true at the start: independent choices; and what each action tells.
+/// How likely the fact at a place of a walk is false and true, and the turns that come next if it is (-1: none).
+struct Turn {
+  std::size_t place;
+  std::array<std::uint64_t, 2> weights;
+  std::array<int, 2> next;
+};
+
+/// Facts, by number, that are drawn one after the other; the last turn comes first. Facts that no turn draws are
+/// as likely true as false.
+struct Walk {
+  std::vector<std::size_t> facts;
+  std::vector<Turn> turns;
+};
+
+/// What may be true at the start: independent choices, and walks; and what each action tells.
 struct HiddenModel {
   std::vector<std::vector<Draw>> priors;
   std::map<std::string, std::vector<Telling>> tellings;
+  std::vector<Walk> walks;
 };
 
 /// The state of a run: what is true, and, told by the monitor, what is known.
@@ -77,8 +93,30 @@ class HiddenWorld : public SimulatedWorld {
         *report << '\n';
       }
     }
+    for (const auto& walk : hidden_.walks) {
+      go(walk, report);
+    }
     monitor_.restart();
     listen("");
+  }
+
+  void go(const Walk& walk, std::ostream* report) {
+    static const Turn none = {0, {1u, 1u}, {-1, -1}};
+    int at = static_cast<int>(walk.turns.size()) - 1;
+    for (std::size_t place = 0; place < walk.facts.size(); ++place) {
+      const bool asked = at >= 0 && walk.turns[at].place == place;
+      const auto& turn = asked ? walk.turns[at] : none;
+      const auto value = draw(turn.weights, [](std::uint64_t weight) { return weight; });
+      state_[walk.facts[place]] = truth(value == 1);
+      at = asked ? turn.next[value] : at;
+    }
+    if (report != nullptr) {
+      *report << "the truth:";
+      for (const auto fact : walk.facts) {
+        *report << (state_[fact] == Truth::True ? " " + model_.facts[fact] : "");
+      }
+      *report << '\n';
+    }
   }
 
   void listen(const std::string& action) {

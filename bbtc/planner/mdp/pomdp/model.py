@@ -23,8 +23,9 @@ from typing import TypeAlias
 import numpy as np
 
 from bbtc.belief.draws import Values, compile_factor, product_of
-from bbtc.belief.hidden import Readings, belief_in, local_values
+from bbtc.belief.hidden import Readings, belief_in
 from bbtc.belief.state import Bounded, initial_belief
+from bbtc.belief.worlds.kernel import local_values
 from bbtc.ground.condition import Condition, Is, compile_condition, negation
 from bbtc.ground.task import NO_CHANGE, Observation, Task
 from bbtc.kleene import Truth
@@ -103,10 +104,10 @@ class Pomdp:
 
 
 def pomdp_of(task: Task, limits: Limits) -> Pomdp | None:
-    """The task as such a process. None where conditions are too large a disjunction, and where effects read
-    what is known. Raises ``LimitReached`` where it has more worlds than the limit on
-    states, or where it takes too long."""
-    if reads_knowledge(task):
+    """The task as such a process. None where conditions are too large a disjunction, where effects read what
+    is known, and where there are worlds that are not listed. Raises ``LimitReached`` where it has more worlds
+    than the limit on states, or where it takes too long."""
+    if reads_knowledge(task) or any(component.diagram is not None for component in task.components):
         return None
     told = _told_always(task)
     known = _Known.of(task, told)
@@ -307,7 +308,7 @@ class _Maker:
         """What an action may do in a world: what is told, the number of the world after, the probability."""
         changes = self._changes[action]
         parts = [
-            readings.parts(bytes(values[variable] for variable in change.seen), world[change.component])
+            list(readings.parts(bytes(values[at] for at in change.seen), world[change.component]))
             for change, readings in changes
         ]
         for (delta, _, _), chance in product_of(values, self._drawers[action], self._bounded.spend).items():

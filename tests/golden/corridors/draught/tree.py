@@ -302,19 +302,15 @@ def create_root(robot: Robot) -> Behaviour:
         fallback(
             "fallback",
             Condition("robot-at(lab)", lambda: robot.robot_at("lab")),
-            sequence(
-                "for robot-at(lab)",
-                Condition("robot-at(canteen)", lambda: robot.robot_at("canteen")),
-                Latch(
-                    "pass(back-door,canteen,lab)",
-                    lambda: robot.do_pass("back-door", "canteen", "lab"),
-                    robot.cancel,
-                    keep=False,
-                ),
+            Latch(
+                "pass(back-door,canteen,lab)",
+                lambda: robot.do_pass("back-door", "canteen", "lab"),
+                robot.cancel,
+                guard=lambda: robot.robot_at("canteen"),
+                keep=False,
             ),
             sequence(
                 "sequence",
-                Condition("robot-at(lobby)", lambda: robot.robot_at("lobby")),
                 Condition(
                     "known believed-open(lab-door,0.8)",
                     lambda: robot.monitor.value("believed-open", "lab-door", "0.8") is not None,
@@ -327,22 +323,19 @@ def create_root(robot: Robot) -> Behaviour:
                     "pass(canteen-door,lobby,canteen)",
                     lambda: robot.do_pass("canteen-door", "lobby", "canteen"),
                     robot.cancel,
+                    guard=lambda: robot.robot_at("lobby"),
                     keep=False,
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition("not heard(lab-door)", lambda: negated(robot.heard("lab-door"))),
-                Latch(
-                    "listen(lab-door,lobby)",
-                    *watched(
-                        robot,
-                        ("listen", "lab-door", "lobby"),
-                        lambda: robot.listen("lab-door", "lobby"),
-                    ),
-                    guard=lambda: all_of(robot.robot_at("lobby"), negated(robot.heard("lab-door"))),
-                    keep=False,
+            Latch(
+                "listen(lab-door,lobby)",
+                *watched(
+                    robot,
+                    ("listen", "lab-door", "lobby"),
+                    lambda: robot.listen("lab-door", "lobby"),
                 ),
+                guard=lambda: all_of(robot.robot_at("lobby"), negated(robot.heard("lab-door"))),
+                keep=False,
             ),
             sequence(
                 "sequence",
@@ -364,22 +357,15 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
                 fallback(
                     "fallback",
-                    sequence(
-                        "for robot-at(lab)",
-                        Condition(
-                            "open(lab-door)",
-                            lambda: robot.monitor.value("open", "lab-door"),
+                    Latch(
+                        "pass(lab-door,office,lab)",
+                        lambda: robot.do_pass("lab-door", "office", "lab"),
+                        robot.cancel,
+                        guard=lambda: all_of(
+                            robot.monitor.value("open", "lab-door"),
+                            robot.robot_at("office"),
                         ),
-                        Latch(
-                            "pass(lab-door,office,lab)",
-                            lambda: robot.do_pass("lab-door", "office", "lab"),
-                            robot.cancel,
-                            guard=lambda: all_of(
-                                robot.monitor.value("open", "lab-door"),
-                                robot.robot_at("office"),
-                            ),
-                            keep=False,
-                        ),
+                        keep=False,
                     ),
                     sequence(
                         "for robot-at(lobby)",
@@ -400,23 +386,19 @@ def create_root(robot: Robot) -> Behaviour:
                     ),
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition("robot-at(office)", lambda: robot.robot_at("office")),
-                Latch(
-                    "peek(lab-door,office,lab)",
-                    *watched(
-                        robot,
-                        ("peek", "lab-door", "office", "lab"),
-                        lambda: robot.peek("lab-door", "office", "lab"),
-                    ),
-                    keep=False,
+            Latch(
+                "peek(lab-door,office,lab)",
+                *watched(
+                    robot,
+                    ("peek", "lab-door", "office", "lab"),
+                    lambda: robot.peek("lab-door", "office", "lab"),
                 ),
+                guard=lambda: robot.robot_at("office"),
+                keep=False,
             ),
             sequence(
                 "for robot-at(office)",
                 Condition("known open(office-door)", lambda: robot.open("office-door") is not None),
-                Condition("open(office-door)", lambda: robot.open("office-door")),
                 Latch(
                     "pass(office-door,lobby,office)",
                     lambda: robot.do_pass("office-door", "lobby", "office"),

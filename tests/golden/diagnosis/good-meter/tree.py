@@ -326,17 +326,11 @@ def create_root(robot: Robot) -> Behaviour:
                 ),
                 fallback(
                     "fallback",
-                    sequence(
-                        "sequence",
-                        Condition(
-                            "unknown faulty(cable)",
-                            lambda: robot.monitor.value("faulty", "cable") is None,
-                        ),
-                        Latch(
-                            "measure(cable)",
-                            *watched(robot, ("measure", "cable"), lambda: robot.measure("cable")),
-                            keep=False,
-                        ),
+                    Latch(
+                        "measure(cable)",
+                        *watched(robot, ("measure", "cable"), lambda: robot.measure("cable")),
+                        guard=lambda: robot.monitor.value("faulty", "cable") is None,
+                        keep=False,
                     ),
                     Latch(
                         "measure(motor)",

@@ -366,23 +366,17 @@ def create_root(robot: Robot) -> Behaviour:
                             keep=False,
                         ),
                     ),
-                    sequence(
-                        "sequence",
-                        Condition("not measured(cable)", lambda: negated(robot.measured("cable"))),
-                        Latch(
-                            "estimate(cable)",
-                            *watched(robot, ("estimate", "cable"), lambda: robot.estimate("cable")),
-                            keep=False,
-                        ),
+                    Latch(
+                        "estimate(cable)",
+                        *watched(robot, ("estimate", "cable"), lambda: robot.estimate("cable")),
+                        guard=lambda: negated(robot.measured("cable")),
+                        keep=False,
                     ),
-                    sequence(
-                        "sequence",
-                        Condition("not measured(motor)", lambda: negated(robot.measured("motor"))),
-                        Latch(
-                            "estimate(motor)",
-                            *watched(robot, ("estimate", "motor"), lambda: robot.estimate("motor")),
-                            keep=False,
-                        ),
+                    Latch(
+                        "estimate(motor)",
+                        *watched(robot, ("estimate", "motor"), lambda: robot.estimate("motor")),
+                        guard=lambda: negated(robot.measured("motor")),
+                        keep=False,
                     ),
                     sequence(
                         "sequence",

@@ -298,17 +298,11 @@ def create_root(robot: Robot) -> Behaviour:
                     lambda: negated(robot.monitor.value("spoilt", "base")),
                 ),
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "unknown upside-down(base)",
-                    lambda: robot.monitor.value("upside-down", "base") is None,
-                ),
-                Latch(
-                    "look(base)",
-                    *watched(robot, ("look", "base"), lambda: robot.look("base")),
-                    keep=False,
-                ),
+            Latch(
+                "look(base)",
+                *watched(robot, ("look", "base"), lambda: robot.look("base")),
+                guard=lambda: robot.monitor.value("upside-down", "base") is None,
+                keep=False,
             ),
             sequence(
                 "sequence",
@@ -320,26 +314,17 @@ def create_root(robot: Robot) -> Behaviour:
                     keep=False,
                 ),
             ),
-            sequence(
-                "for pressed(base)",
-                Condition("not pressed(base)", lambda: negated(robot.pressed("base"))),
-                Latch(
-                    "press(base)",
-                    *watched(robot, ("press", "base"), lambda: robot.press("base")),
-                    keep=False,
-                ),
+            Latch(
+                "press(base)",
+                *watched(robot, ("press", "base"), lambda: robot.press("base")),
+                guard=lambda: negated(robot.pressed("base")),
+                keep=False,
             ),
-            sequence(
-                "sequence",
-                Condition(
-                    "unknown upside-down(lid)",
-                    lambda: robot.monitor.value("upside-down", "lid") is None,
-                ),
-                Latch(
-                    "look(lid)",
-                    *watched(robot, ("look", "lid"), lambda: robot.look("lid")),
-                    keep=False,
-                ),
+            Latch(
+                "look(lid)",
+                *watched(robot, ("look", "lid"), lambda: robot.look("lid")),
+                guard=lambda: robot.monitor.value("upside-down", "lid") is None,
+                keep=False,
             ),
             sequence(
                 "for pressed(lid)",

@@ -83,6 +83,18 @@ def in_words(fact: Fact) -> str:
     return f"{fact[0]}({','.join(fact[1:])})"
 
 
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def negated(value: bool | None) -> bool | None:
+    """Three-valued "not": unknown stays unknown."""
+    return None if value is None else not value
+
+
 class Condition(Behaviour):
     """SUCCESS, FAILURE or RUNNING for a condition that is True, False or None (unknown)."""
 
@@ -348,11 +360,15 @@ def create_root(robot: Robot) -> Behaviour:
                                     keep=False,
                                 ),
                             ),
-                            Condition("hand_free()", robot.hand_free),
                             Latch(
                                 "open(cupboard4)",
                                 lambda: robot.open("cupboard4"),
                                 robot.cancel,
+                                guard=lambda: all_of(
+                                    robot.near("cupboard4"),
+                                    negated(robot.is_open("cupboard4")),
+                                    robot.hand_free(),
+                                ),
                                 keep=False,
                             ),
                         ),
@@ -373,11 +389,15 @@ def create_root(robot: Robot) -> Behaviour:
                                     keep=False,
                                 ),
                             ),
-                            Condition("hand_free()", robot.hand_free),
                             Latch(
                                 "pick(cup1,table1)",
                                 lambda: robot.pick("cup1", "table1"),
                                 robot.cancel,
+                                guard=lambda: all_of(
+                                    robot.near("table1"),
+                                    robot.at("cup1", "table1"),
+                                    robot.hand_free(),
+                                ),
                                 keep=False,
                             ),
                         ),
@@ -415,11 +435,15 @@ def create_root(robot: Robot) -> Behaviour:
                             keep=False,
                         ),
                     ),
-                    Condition("hand_free()", robot.hand_free),
                     Latch(
                         "switch_on(radio9)",
                         lambda: robot.switch_on("radio9"),
                         robot.cancel,
+                        guard=lambda: all_of(
+                            robot.near("radio9"),
+                            robot.hand_free(),
+                            negated(robot.switched_on("radio9")),
+                        ),
                         keep=False,
                     ),
                 ),
@@ -455,25 +479,29 @@ def create_root(robot: Robot) -> Behaviour:
                                             keep=False,
                                         ),
                                     ),
-                                    Condition(
-                                        "open(cupboard4)",
-                                        lambda: robot.is_open("cupboard4"),
-                                    ),
                                     Latch(
                                         "look_for(bottle4,cupboard4)",
                                         lambda: robot.look_for("bottle4", "cupboard4"),
                                         robot.cancel,
+                                        guard=lambda: all_of(
+                                            robot.near("cupboard4"),
+                                            robot.at("bottle4", "cupboard4") is None,
+                                            robot.is_open("cupboard4"),
+                                        ),
                                         keep=False,
                                     ),
                                 ),
                             ),
-                            Condition("near(cupboard4)", lambda: robot.near("cupboard4")),
-                            Condition("hand_free()", robot.hand_free),
-                            Condition("open(cupboard4)", lambda: robot.is_open("cupboard4")),
                             Latch(
                                 "pick(bottle4,cupboard4)",
                                 lambda: robot.pick("bottle4", "cupboard4"),
                                 robot.cancel,
+                                guard=lambda: all_of(
+                                    robot.near("cupboard4"),
+                                    robot.at("bottle4", "cupboard4"),
+                                    robot.hand_free(),
+                                    robot.is_open("cupboard4"),
+                                ),
                                 keep=False,
                             ),
                         ),
@@ -508,12 +536,15 @@ def create_root(robot: Robot) -> Behaviour:
                                     ),
                                 ),
                             ),
-                            Condition("near(windowsill10)", lambda: robot.near("windowsill10")),
-                            Condition("hand_free()", robot.hand_free),
                             Latch(
                                 "pick(bottle4,windowsill10)",
                                 lambda: robot.pick("bottle4", "windowsill10"),
                                 robot.cancel,
+                                guard=lambda: all_of(
+                                    robot.near("windowsill10"),
+                                    robot.at("bottle4", "windowsill10"),
+                                    robot.hand_free(),
+                                ),
                                 keep=False,
                             ),
                         ),

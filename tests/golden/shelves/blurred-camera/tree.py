@@ -336,15 +336,12 @@ def create_root(robot: Robot) -> Behaviour:
                             keep=False,
                         ),
                     ),
-                    sequence(
-                        "sequence",
-                        Condition("robot-at(left)", lambda: robot.robot_at("left")),
-                        Latch(
-                            "drive(left,right)",
-                            lambda: robot.drive("left", "right"),
-                            robot.cancel,
-                            keep=False,
-                        ),
+                    Latch(
+                        "drive(left,right)",
+                        lambda: robot.drive("left", "right"),
+                        robot.cancel,
+                        guard=lambda: robot.robot_at("left"),
+                        keep=False,
                     ),
                     Latch(
                         "grasp(right)",
