@@ -195,6 +195,28 @@ def test_simulated_worlds_of_exports_begin_there(text: str, tmp_path: Path) -> N
     assert truths == {f"the truth: {each}" for each in shown}
 
 
+def test_worlds_that_are_not_listed_are_given_too(tmp_path: Path) -> None:
+    """16,383 of them; two balls are somewhere."""
+    cups = [f"c{number}" for number in range(14)]
+    text = f"""(define (domain many) (:predicates (ball ?c) (found))
+      (:action look :parameters (?c) :observe (ball ?c))
+      (:action ask :observe (exists (?c) (ball ?c)))
+      (:action take :parameters (?c) :precondition (ball ?c) :effect (found)))
+    (define (problem p) (:domain many) (:objects {" ".join(cups)})
+      (:init (or {" ".join(f"(ball {cup})" for cup in cups)})) {{true}} (:goal (found)))"""
+    plan, _ = compiled(text, "(:hidden (ball c3) (ball c9))")
+    (component,) = with_hidden(plan.tree.task).components
+    assert component.diagram is not None
+    assert {truth for truth, _, _ in runs(plan.tree, 3)} == {frozenset(["ball(c3)", "ball(c9)"])}
+    written = export_tree(plan.tree, "py_trees", {}, Limits())
+    assert isinstance(written, str)
+    (tmp_path / "many.py").write_text(written, "utf-8")
+    done = subprocess.run(
+        [sys.executable, tmp_path / "many.py"], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout.startswith("the truth: really ball(c3), really ball(c9)\n")
+
+
 def test_robots_in_cpp_begin_there() -> None:
     """The world of the project draws nothing at the start."""
     plan, _ = compiled(SHELVES, "(:hidden (can c))")
