@@ -164,7 +164,8 @@ class DiagramBeliefs(Beliefs):
     ) -> tuple[dict[_Piece, Weighted], int]:
         """What an observation tells of each piece, and the factor of all weights."""
         observation, diagrams = kernel.change.observations[at], self._diagrams
-        right, scale = observation.accuracy.numerator, observation.accuracy.denominator
+        scale = lcm(*(observation.right(true).denominator for true in (True, False)))
+        right = [int(observation.right(true) * scale) for true in (False, True)]
         found: dict[_Piece, Weighted] = {}
 
         def add(piece: _Piece, told: Told, factor: int, mass: Weighted) -> None:
@@ -181,8 +182,8 @@ class DiagramBeliefs(Beliefs):
             if asked.weight:
                 for value, node in ((1, true), (0, diagrams.complement(true))):
                     part = diagrams.times(asked, node)
-                    add(piece, ((~at, value),), right, part)
-                    add(piece, ((~at, 1 - value),), scale - right, part)
+                    add(piece, ((~at, value),), right[value], part)
+                    add(piece, ((~at, 1 - value),), scale - right[value], part)
         return found, scale
 
     def _seen_after(self, told: Told, seen: bytes) -> bytes:
