@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+import sysconfig
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import yaml
 
 from tests.builder.projects import COIN
 from tests.integration.tools import REPOSITORY, edit, program, recipe, run, runs, tool
+from tests.long_form import LONG
 
 PAGE = (REPOSITORY / "docs" / "build-systems.md").read_text("utf-8")
 DOMAIN, _, PROBLEM = COIN.partition("(define (problem")
@@ -104,6 +106,14 @@ def git(folder: Path, *arguments: str) -> str:
     return run(tool("git"), *who, *arguments, cwd=folder)
 
 
+# pip need not compile all modules of what it installs, most of which are never loaded. In the short form it
+# installs bbtc alone, and finds here what bbtc needs, and what builds it.
+INSTALL = {"PIP_NO_COMPILE": "1"}
+if not LONG:
+    here = {"PYTHONPATH": sysconfig.get_path("purelib"), "PIP_NO_DEPS": "1", "PIP_NO_BUILD_ISOLATION": "false"}
+    INSTALL |= here | {"PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+
+
 @pytest.fixture(scope="module")
 def hooks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A git repository with what the hooks are installed from."""
@@ -130,6 +140,8 @@ def test_the_hooks_check_format_and_find_drift(
     (source / ".pre-commit-config.yaml").write_text(yaml.safe_dump(config))
     manifest = "output: trees\ntrees: {soda: {domain: domain.pddl, problem: soda.pddl}}\n"
     (source / "bbtc.yaml").write_text(manifest)
+    if not LONG:
+        pytest.importorskip("hatchling", reason="hatchling is not installed")
     path = program(source.parent).parent
     run("bbtc", "fmt", *sorted(file.name for file in source.glob("*.pddl")), cwd=source, path=path)
     run("bbtc", "build", cwd=source, path=path)
@@ -140,8 +152,7 @@ def test_the_hooks_check_format_and_find_drift(
         done = subprocess.run(
             [tool("pre-commit"), "run", "--all-files", "--color", "never", *([name] if name else [])],
             cwd=source,
-            # pip need not compile all modules of what it installs, most of which are never loaded.
-            env={**os.environ, "PRE_COMMIT_HOME": str(home), "PIP_NO_COMPILE": "1"},
+            env={**os.environ, **INSTALL, "PRE_COMMIT_HOME": str(home)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -27,8 +27,9 @@ from bbtc.planner.result import Plan, Refinement
 from bbtc.planner.strategies import DEFAULT
 from bbtc.rewrite.simplify import numbered
 from bbtc.source import SourceFile
-from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, actions_of, retries_of, walk
-from tests.domains.problems import PROBLEMS, Problem, task_of
+from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree, actions_of, retries_of, walk
+from tests.domains.problems import PROBLEMS, Problem, task_of, tree_of
+from tests.long_form import LONG
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -60,8 +61,8 @@ def told(problem: Problem) -> tuple[Plan, tuple[Refinement, ...]]:
     return plan(task_of(problem), "auto", None, steps), tuple(steps)
 
 
-def size(of: Plan) -> int:
-    return sum(1 for _ in walk(of.tree.root))
+def size(of: Plan | Tree) -> int:
+    return sum(1 for _ in walk((of.tree if isinstance(of, Plan) else of).root))
 
 
 @examples(60)
@@ -89,23 +90,38 @@ def from_elsewhere(of: Task, done: Plan) -> Elsewhere:
     return elsewhere_of(explore(only_at(of, starts), done.tree.root, Limits()), done.chain)
 
 
+SLOW = {
+    "shelves/blurred-camera": "search",  # for 3 s
+    "trolley/three-trays": "refine",  # for 2 s, until a limit ends it
+}
+"""With what a problem is compared in the long form only."""
+
+
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
+    """The tree in its golden file; in the long form, the one that small limits allow."""
     of = task_of(problem)
-    done, small = told(problem)[0], plan(of, "auto", prefer="size")
-    assert done.tree.status == small.tree.status == "target-reached"
+    done = told(problem)[0].tree if LONG else tree_of(problem, DEFAULT)
+    small = plan(of, "auto", prefer="size")
+    assert done.status == small.tree.status == "target-reached"
     most = 110 if problem.domain == "hospital" else 80
-    searched = plan(of, "search", prefer="size")
-    assert size(small) <= (min(most, size(searched)) if searched.tree.status == "target-reached" else most)
+    assert size(small) <= most
     assert size(done) <= min(most, allowance(size(small)))
-    assert done.tree.success_probability >= small.tree.success_probability
+    assert done.success_probability >= small.tree.success_probability
+    slow = None if LONG else SLOW.get(str(problem))
+    if slow != "search":
+        searched = plan(of, "search", prefer="size")
+        assert searched.tree.status != "target-reached" or size(small) <= size(searched)
     asks = ("corridors", "diagnosis")  # since that costs less than what refinement does
-    if problem.domain not in ("service-robot", "hospital", *asks):
+    if problem.domain not in ("service-robot", "hospital", *asks) and slow != "refine":
         refined = plan(of, "refine")
         assert refined.tree.status != "target-reached" or size(done) <= min(45, size(refined))
 
 
-@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+LARGE = {"hospital/one-box", "hospital/two-boxes", "service-robot/two-goals"}
+
+
+@pytest.mark.parametrize("problem", [each for each in PROBLEMS if LONG or str(each) not in LARGE], ids=str)
 def test_the_refinements_told_are_those_of_the_tree_that_is_kept(problem: Problem) -> None:
     done, steps = told(problem)
     assert steps == done.refinements
