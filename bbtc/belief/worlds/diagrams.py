@@ -68,15 +68,15 @@ class DiagramBeliefs(Beliefs):
         return found
 
     def _known_in(self, node: int) -> Iterator[tuple[int, int]]:
-        true = self._diagrams.true_weights(node)
-        total = self._diagrams.total(Weighted(1, node))
+        sure = self._diagrams.sure(node)
         for each in self.component.known:
             match each.condition:
-                case Is(place, Truth.TRUE):
-                    weight = true[place]
+                case Is(place, Truth.TRUE) if each.at_least == 1:
+                    true, false = (places >> place & 1 for places in sure)
+                    yield each.variable, int(Truth.TRUE if true else Truth.FALSE if false else Truth.UNKNOWN)
                 case condition:
-                    weight, _ = self._of.share(node, condition)
-            yield each.variable, int(believed(weight, total, each.at_least))
+                    weight, total = self._of.share(node, condition)
+                    yield each.variable, int(believed(weight, total, each.at_least))
 
     def _chance(self, number: int, condition: Condition) -> Fraction:
         return Fraction(*self._of.share(self._nodes[number], condition))
