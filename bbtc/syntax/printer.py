@@ -218,7 +218,7 @@ class _Docs:
         name = _leaf(node.name)
         if node.parameters is not None:
             last = node.parameters[-1].span.end if node.parameters else node.name.span.end
-            around = self._parentheses(node.name.span.start, last, node.span)
+            around = self._parentheses(node.span.start + 1, last, node.span)
             name = Doc(f"({node.name.text}", self.groups(node.parameters), ")", around, filled=True)
         values = tuple(map(self.formula, node.values))
         return Doc(f"(:{node.kind}", (name, *values), ")", node.span, glued=1)

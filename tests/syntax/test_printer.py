@@ -106,6 +106,22 @@ PAIRS = {
 ; after it
 """,
     ),
+    "comments in what a variable takes stay there": (
+        """(define (domain d) (:variable (at ?r - robot) (in ?r ; the robot
+ ) ; or
+ (out)) (:variable (lit ; all of it
+ ) (a)))""",
+        """\
+(define (domain d)
+  (:variable (at ?r - robot)
+    (in ?r ; the robot
+    ) ; or
+    (out))
+  (:variable (lit ; all of it
+    )
+    (a)))
+""",
+    ),
     "comments in a column keep it, and move right together where code is longer": (
         """\
 (define (domain d) (:predicates (p)      ; one
