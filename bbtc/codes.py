@@ -139,6 +139,9 @@ _CODES = (
     Code("BBT0419", "repeats without noise", _WARNING),
     Code("BBT0420", "belief that cannot be asked for"),
     Code("BBT0421", "model of observation that is not read"),
+    Code("BBT0430", "too much for the text of a partially observable process"),
+    Code("BBT0431", "true world that cannot be", _WARNING),
+    Code("BBT0432", "reading that tells nothing, or the contrary"),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

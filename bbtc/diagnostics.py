@@ -138,7 +138,7 @@ class BbtcError(Exception):
         self.diagnostics = tuple(diagnostics)
         super().__init__("\n".join(d.render() for d in self.diagnostics))
 
-    def __reduce__(self) -> tuple[type[BbtcError], tuple[tuple[Diagnostic, ...]]]:
+    def __reduce__(self) -> tuple[type[BbtcError], tuple[object, ...]]:
         return type(self), (self.diagnostics,)  # else a pickle would hold the text alone
 
     @classmethod

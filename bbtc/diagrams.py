@@ -73,6 +73,8 @@ class Diagrams:
         self._levels = [last, last]
         self._edges: list[_Edges] = [(NOTHING, NOTHING)] * 2
         self._totals = [0, 1]
+        self._sure = [(0, 0), (0, 0)]
+        """By node: the places that are true, and those that are false, in all worlds with a weight."""
         self._numbers: dict[tuple[int, Weighted, Weighted], int] = {}
         self._products: dict[tuple[int, int], Weighted] = {}
         self._sums: dict[_Sum, Weighted] = {}
@@ -100,7 +102,20 @@ class Diagrams:
             self._levels.append(level)
             self._edges.append((low, high))
             self._totals.append(self._below(level, low) + self._below(level, high))
+            self._sure.append(self._sure_in(level, low, high))
         return Weighted(common, found)
+
+    def _sure_in(self, level: int, low: Weighted, high: Weighted) -> tuple[int, int]:
+        place = 1 << self.order[level]
+        if not low.weight:
+            true, false = self._sure[high.node]
+            return true | place, false
+        if not high.weight:
+            true, false = self._sure[low.node]
+            return true, false | place
+        both = zip(self._sure[low.node], self._sure[high.node], strict=True)
+        true, false = (one & other for one, other in both)
+        return true, false
 
     def _below(self, level: int, edge: Weighted) -> int:
         """The sum of a function over all values of the places after a level."""
@@ -132,9 +147,9 @@ class Diagrams:
         """The product of two functions."""
         if len(self._products) > _MOST_KEPT:
             self._products.clear()
-        known = self._products
-        stack = [(one, other) if one < other else (other, one)]
-        asked = stack[0]
+        known, levels, split = self._products, self._levels, self._edges
+        asked = (one, other) if one < other else (other, one)
+        stack = [asked]
         while stack:
             key = stack[-1]
             if key in known:
@@ -143,20 +158,29 @@ class Diagrams:
             first, second = key
             if first in (ZERO, ONE):
                 known[key] = Weighted(first, second if first else ZERO)
+                stack.pop()
                 continue
-            level = min(self._levels[first], self._levels[second])
-            pairs = list(zip(self._split(first, level), self._split(second, level), strict=True))
-            keys = [(a.node, b.node) if a.node < b.node else (b.node, a.node) for a, b in pairs]
-            missing = [each for each in keys if each not in known]
-            if missing:
-                stack += missing
-                continue
+            level = min(levels[second], levels[first])
+            mine = split[first] if levels[first] == level else ((1, first),) * 2
+            others = split[second] if levels[second] == level else ((1, second),) * 2
             edges = []
-            for (a, b), each in zip(pairs, keys, strict=True):
-                inner = known[each]
-                weight = a.weight * b.weight * inner.weight
-                edges.append(Weighted(weight, inner.node) if weight else NOTHING)
-            known[key] = self._make(level, *edges)
+            missing = False
+            for (a, node), (b, with_) in zip(mine, others, strict=True):
+                if not a or not b:
+                    edges.append(NOTHING)
+                    continue
+                pair = (node, with_) if node < with_ else (with_, node)
+                inner = known.get(pair)
+                if inner is None:
+                    stack.append(pair)
+                    missing = True
+                elif inner.weight:
+                    edges.append(Weighted(a * b * inner.weight, inner.node))
+                else:
+                    edges.append(NOTHING)
+            if not missing:
+                known[key] = self._make(level, *edges)
+                stack.pop()
         return known[asked]
 
     def times(self, one: Weighted, other: int) -> Weighted:
@@ -285,32 +309,9 @@ class Diagrams:
                     waiting.append(edge.node)
         return sorted((each for each in found if each > ONE), key=lambda each: (self._levels[each], each))
 
-    def true_weights(self, node: int) -> dict[int, int]:
-        """By place: the weight of all worlds in which it is true, in the unit of :meth:`total`."""
-        last = len(self.order)
-        above = {node: 1 << self._levels[node]}
-        alone = [0] * (last + 1)
-        """By level: the difference to the level before, of the weight of worlds whose path jumps over it."""
-        whole = self._totals[node]
-        alone[0] += whole << self._levels[node]
-        alone[self._levels[node]] -= whole << self._levels[node]
-        true = [0] * last
-        for each in self._reached(node):
-            level, weight = self._levels[each], above[each]
-            for value, edge in enumerate(self._edges[each]):
-                if not edge.weight:
-                    continue
-                jumped = weight * edge.weight << (self._levels[edge.node] - level - 1)
-                above[edge.node] = above.get(edge.node, 0) + jumped
-                mass = jumped * self._totals[edge.node]
-                true[level] += mass if value else 0
-                alone[level + 1] += mass
-                alone[self._levels[edge.node]] -= mass
-        found, jumping = {}, 0
-        for level, place in enumerate(self.order):
-            jumping += alone[level]
-            found[place] = true[level] + jumping // 2
-        return found
+    def sure(self, node: int) -> tuple[int, int]:
+        """The places that are true, and those that are false, in all worlds with a weight, as bits."""
+        return self._sure[node]
 
     def pick(self, node: int, point: Fraction) -> int:
         """The world at a point from 0 to below 1, where all stand in a row as long as their weights."""

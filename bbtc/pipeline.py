@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from bbtc.diagnostics import BbtcError, Diagnostic, LimitReached, Related, Report, Severity
 from bbtc.ground.task import Task
-from bbtc.limits import Limits
+from bbtc.limits import MOST_WORLDS, Limits
 from bbtc.rounding import figure_text
 from bbtc.source import AS_WRITTEN, Reading, SourceFile
 from bbtc.tree.nodes import PlanStatus, Tree
@@ -462,7 +462,7 @@ def plan_task(
         search_ends()
         if plan is None and best.empty:
             raise
-        plan = unjudged(plan or best.plan("limit-reached", reached.diagnostics[0]))
+        plan = unjudged(plan or best.plan("limit-reached", reached.diagnostics[0]), reached)
     except KeyboardInterrupt:
         search_ends()
         plan = plan or best.plan("interrupted")
@@ -497,24 +497,42 @@ _STATES_OF_WORLDS = 20_000
 
 def with_worst_world(tree: Tree, figures: Figures, limits: Limits) -> Figures:
     """The figures with what the tree attains in the worst world that hidden facts may make at the start, as
-    far as the limits allow."""
+    far as the limits allow; else with the reason why that is not told, unless the tree always succeeds."""
     from bbtc.belief.worst_world import WorstWorld, with_worlds, worst_world
 
-    if figures.success == 1 and with_worlds(tree.task) is not None:
-        return replace(figures, worst=WorstWorld(figures.success, (), frozenset()))
-    limits = replace(limits, states=min(limits.states, _STATES_OF_WORLDS))
+    full = with_worlds(tree.task)
+    if figures.success == 1:
+        worst = None if full is None else WorstWorld(figures.success, (), frozenset())
+        return replace(figures, worst=worst)
+    if full is None:
+        hides = any(variable.hidden for variable in tree.task.variables)
+        untold = "the tree does not hold the worlds of its hidden facts: give the domain and the problem, too"
+        return replace(figures, worst_untold=untold) if hides else figures
+    states = min(limits.states, _STATES_OF_WORLDS)
     try:
-        return replace(figures, worst=worst_world(tree.task, tree.root, limits))
-    except LimitReached:
-        return figures
+        found = worst_world(tree.task, tree.root, replace(limits, states=states))
+    except LimitReached as reached:
+        untold = reached.diagnostics[0].message
+        if not limits.met:
+            untold = f"more than {states:,} states of worlds and beliefs would have to be looked at"
+        return replace(figures, worst_untold=untold)
+    if found is None:
+        untold = f"the hidden facts that matter to the tree have more than {MOST_WORLDS:,} worlds"
+        return replace(figures, worst_untold=untold)
+    return replace(figures, worst=found)
 
 
-def process_text(task: Task, form: str) -> str:
-    """The task as a Markov decision process, in the format ``prism`` or ``jani``."""
+def process_text(task: Task, form: str, limits: Limits) -> str:
+    """The task as a Markov decision process, in the format ``prism`` or ``jani``; in the format
+    ``prism-pomdp`` of a policy that sees what the robot sees."""
     from bbtc.backends.models import jani, prism
     from bbtc.belief.hidden import refuse_hidden
+    from bbtc.belief.worst_world import with_worlds
 
-    refuse_hidden(task, "written as a Markov decision process")
+    if form == "prism-pomdp":
+        return prism.partial_task_text(with_worlds(task) or task, limits)
+    hint = "--emit prism-pomdp writes what a policy can do that sees what the robot sees"
+    refuse_hidden(task, "written as a Markov decision process", hint)
     return prism.task_text(task) if form == "prism" else jani.task_text(task)
 
 

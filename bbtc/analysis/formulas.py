@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 from math import lcm
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from typing_extensions import assert_never
 
@@ -229,9 +229,34 @@ def _is_derived(names: Names, target: ast.Atom) -> bool:
     return predicate.derived
 
 
+def noisy_reading(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Choice:
+    """What a noisy reading tells: of a fact, and, if it errs otherwise there, of its contrary, how probably
+    it is right where that is true."""
+    drawn, faulty = _drawn(names, node, scope)
+    if faulty or not me.both_ways([each for _, each, _ in drawn]):
+        return _summed(names, node, drawn, faulty)
+    total = sum((value for value, _, _ in drawn), Fraction(0))
+    if total <= 1:
+        told = "nothing" if total == 1 else "the contrary"
+        message = f"this reading tells {told}: it has to be right with probabilities that sum to more than 1"
+        hint = "`(probabilistic q (p) r (not (p)))` is right with q where `(p)` is true, with r where not"
+        names.report.error("BBT0432", message, node.span, hint)
+    return me.Choice(
+        tuple(me.Branch(value, part, branch.span) for value, part, branch in drawn), False, node.span
+    )
+
+
 def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Choice:
     """A draw with probabilities that sum to 1 (see :data:`ROUNDING`)."""
-    drawn: list[tuple[Fraction, me.Effect, ast.Branch]] = []
+    return _summed(names, node, *_drawn(names, node, scope))
+
+
+_Drawn: TypeAlias = list[tuple[Fraction, me.Effect, ast.Branch]]
+
+
+def _drawn(names: Names, node: ast.Probabilistic, scope: Scope) -> tuple[_Drawn, bool]:
+    """The branches of a draw, and whether something is wrong with their numbers."""
+    drawn: _Drawn = []
     faulty = False
     for branch in node.branches:
         value = branch.probability.value
@@ -248,6 +273,10 @@ def probabilistic(names: Names, node: ast.Probabilistic, scope: Scope) -> me.Cho
         message = "the sum of the probabilities has too many digits"
         names.report.error("BBT0113", message, node.span, "give them a common denominator")
         faulty = True
+    return drawn, faulty
+
+
+def _summed(names: Names, node: ast.Probabilistic, drawn: _Drawn, faulty: bool) -> me.Choice:
     total = Fraction(1) if faulty else sum((value for value, _, _ in drawn), Fraction(0))
     if faulty:
         total = Fraction(1)

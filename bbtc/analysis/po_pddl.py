@@ -120,14 +120,16 @@ def _observable(
 def _readings(names: Names, rules: _Rules, span: Span) -> Iterator[md.Reading]:
     """What is told of each observable: whether a condition is true, rightly with some probability."""
     for (predicate, args), found in rules.items():
-        accuracy = max(rule.probability for rule in found)
-        if any(rule.probability not in (accuracy, 1 - accuracy) for rule in found):
+        levels = sorted({rule.probability for rule in found}, reverse=True)
+        accuracy, otherwise = levels[0], 1 - levels[-1]
+        if len(levels) > 2:
             shown = " ".join((predicate, *args))
-            message = f"`({shown})` errs differently where it should be true, and where it should be false"
+            message = f"`({shown})` is told with {len(levels)} probabilities, and two are read"
             names.report.error("BBT0421", message, span, _HINT)
-        elif accuracy * 2 > 1:
+        elif len(levels) == 2 or accuracy * 2 > 1:
             right = mf.Or(tuple(rule.condition for rule in found if rule.probability == accuracy))
-            yield md.Reading(right, accuracy, mf.Or(tuple(rule.condition for rule in found)))
+            false = None if len(levels) == 1 or otherwise == accuracy else otherwise
+            yield md.Reading(right, accuracy, mf.Or(tuple(rule.condition for rule in found)), false)
 
 
 # --- the start -----------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 
@@ -119,6 +119,14 @@ def resolve(
     return None if report.errors else model
 
 
+_INSTEAD = dict.fromkeys(
+    (":percepts", ":observe"),
+    "DT-PDDL collects rewards; with a goal to reach, say what an action tells in the action: "
+    "`:observe (probabilistic q (p))`",
+)
+"""By construct that is refused: what to write in its place."""
+
+
 def _check_sections(report: Report, domain: ast.Definition, problem: ast.Definition | None) -> None:
     """Refuse constructs by name, sections in the wrong definition, and second goals."""
     for definition in (domain, problem) if problem is not None else (domain,):
@@ -127,12 +135,10 @@ def _check_sections(report: Report, domain: ast.Definition, problem: ast.Definit
         seen: dict[str, ast.Section] = {}
         for section in definition.sections:
             if isinstance(section, ast.Unsupported):
-                report.error(
-                    "BBT0212",
-                    f"`{section.construct}` is not supported",
-                    section.span,
-                    "actions take no time here, and numbers are costs and rewards",
+                hint = _INSTEAD.get(
+                    section.construct, "actions take no time here, and numbers are costs and rewards"
                 )
+                report.error("BBT0212", f"`{section.construct}` is not supported", section.span, hint)
             elif isinstance(section, wrong) or (
                 isinstance(section, ast.TypedSection) and section.kind == "types" and other == "domain"
             ):
@@ -205,7 +211,7 @@ def _observables(domain: ast.Definition) -> frozenset[str]:
 
 def _observed(names: Names, node: ast.Observation, scope: dict[str, Parameter]) -> mf.Formula | me.Choice:
     if isinstance(node.content, ast.Probabilistic):
-        return formulas.probabilistic(names, node.content, scope)
+        return formulas.noisy_reading(names, node.content, scope)
     return formulas.formula(names, node.content, scope)
 
 
@@ -339,13 +345,10 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
     names.section, names.in_problem = "init", True
     init = initial(names, list(sections(problem, ast.Init)))
     beliefs = list(sections(problem, ast.InitBelief))
+    true_worlds = [tuple(_said(names, hidden.facts)) for hidden in sections(problem, ast.Hidden)]
     if beliefs:
+        true_worlds += [init.facts] * bool(init.facts)
         init = po_pddl.believed(names, beliefs, init)
-    for hidden in sections(problem, ast.Hidden):
-        for fact in hidden.facts:
-            assigned = truth_words.assigned(names, fact)
-            if assigned is not None:
-                formulas.atom(names, assigned.atom, {})
     goal, goal_span = _goal(names, model, problem)
     probability, reward = Fraction(1), Fraction(0)
     for number in sections(problem, ast.GoalNumber):
@@ -368,6 +371,7 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
         model,
         problem=problem.name.key,
         init=init,
+        true_worlds=tuple(true_worlds),
         goal=goal,
         goal_span=goal_span,
         goal_probability=probability,
@@ -375,6 +379,15 @@ def _with_problem(names: Names, model: md.Model, domain: ast.Definition, problem
         metric="cost" if metric is None or not _is_reward(names, metric) else "reward",
         problem_span=problem.name.span,
     )
+
+
+def _said(names: Names, facts: Iterable[ast.Assign]) -> Iterator[md.InitialFact]:
+    """What ``:hidden`` says of ground atoms."""
+    for fact in facts:
+        assigned = truth_words.assigned(names, fact)
+        atom = None if assigned is None else formulas.atom(names, assigned.atom, {})
+        if assigned is not None and atom is not None:
+            yield md.InitialFact(atom.predicate, atom.args, assigned.value, fact.span)
 
 
 def _goal(names: Names, model: md.Model, problem: ast.Definition) -> tuple[mf.Formula | None, Span | None]:

@@ -153,6 +153,10 @@ class At:
             raise self._wrong("an array")
         return [At(value, (*self.path, index)) for index, value in enumerate(self.value)]
 
+    def strings(self) -> tuple[str, ...]:
+        """The elements of an array of strings."""
+        return tuple(element.string() for element in self.elements())
+
     def string(self) -> str:
         """A string that can be written as UTF-8."""
         if not isinstance(self.value, str):

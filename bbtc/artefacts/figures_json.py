@@ -52,6 +52,7 @@ def figures_to_json(
         "states": figures.states,
         **({"mistaken": figure_text(figures.mistaken)} if figures.mistaken else {}),
         **({"worst_world": _worst_world(figures.worst)} if figures.worst is not None else {}),
+        **({} if figures.worst_untold is None else {"worst_world_untold": figures.worst_untold}),
         "scenarios": [
             {
                 "p": figure_text(run.probability),

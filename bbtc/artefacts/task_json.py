@@ -16,9 +16,10 @@ from typing_extensions import assert_never
 
 from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of, variable_from_json
 from bbtc.artefacts.cursor import At, Faults, clip, run_reader
+from bbtc.artefacts.hidden_json import component_to_json, observation_to_json, true_world, true_world_to_json
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
-from bbtc.artefacts.prior_json import check_sum, prior_from_json, prior_to_json
+from bbtc.artefacts.prior_json import check_sum, prior_from_json
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
 from bbtc.ground.task import (
@@ -82,7 +83,9 @@ def task_to_json(task: Task) -> Json:
     ]
     value["goal"] = condition_to_json(task.goal, task.variables)
     if task.components:
-        value["components"] = [_component_to_json(component, task) for component in task.components]
+        value["components"] = [component_to_json(component, task) for component in task.components]
+    if task.true_worlds and task.origin is None:
+        value["true_worlds"] = [true_world_to_json(world) for world in task.true_worlds]
     if task.origin is not None:
         value["origin"] = task_to_json(task.origin)
     value["actions"] = [_action_to_json(action, task) for action in task.actions]
@@ -102,37 +105,6 @@ def _variable_to_json(variable: Variable) -> Json:
     return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
 
 
-def _component_to_json(component: Component, task: Task) -> Json:
-    local = component.local(task, component.seen)
-    value: Json = {
-        "facts": list(component.facts),
-        "prior": prior_to_json(component),
-        "known": [_knowledge_to_json(knowledge, task, local) for knowledge in component.known],
-    }
-    if component.seen:
-        value["seen"] = [task.variables[variable].name for variable in component.seen]
-    if component.first:
-        value["first"] = [_observation_to_json(observation, local) for observation in component.first]
-    return value
-
-
-def _knowledge_to_json(knowledge: Knowledge, task: Task, local: Sequence[Variable]) -> Json:
-    value: Json = {
-        "variable": task.variables[knowledge.variable].name,
-        "condition": condition_to_json(knowledge.condition, local),
-    }
-    return value | ({"at_least": given_text(knowledge.at_least)} if knowledge.at_least != 1 else {})
-
-
-def _observation_to_json(observation: Observation, local: Sequence[Variable]) -> Json:
-    value: Json = {"condition": condition_to_json(observation.condition, local)}
-    if observation.when is not None:
-        value["when"] = condition_to_json(observation.when, local)
-    if observation.accuracy != 1:
-        value["accuracy"] = given_text(observation.accuracy)
-    return value
-
-
 def _change_to_json(change: Change, task: Task) -> Json:
     local = task.components[change.component].local(task, change.seen)
     value: Json = {"component": change.component}
@@ -140,7 +112,7 @@ def _change_to_json(change: Change, task: Task) -> Json:
         value["seen"] = [task.variables[variable].name for variable in change.seen]
     value |= _chance_to_json(change.factors, local)
     if change.observations:
-        value["observations"] = [_observation_to_json(each, local) for each in change.observations]
+        value["observations"] = [observation_to_json(each, local) for each in change.observations]
     return value
 
 
@@ -269,7 +241,16 @@ def read_task(at: At, faults: Faults) -> Task:
     check_header(at, FORMAT, VERSION)
     members = at.members(
         ["format", "version", "domain", "problem", "variables", "initial", "goal", "actions"],
-        ["goal_probability", "goal_reward", "metric", "templates", "signatures", "components", "origin"],
+        [
+            "goal_probability",
+            "goal_reward",
+            "metric",
+            "templates",
+            "signatures",
+            "components",
+            "origin",
+            "true_worlds",
+        ],
     )
     variables = faults.each(members["variables"].elements(), _variable)
     faults.stop_if_any()  # every mention of a variable would be a fault of its own
@@ -281,6 +262,7 @@ def read_task(at: At, faults: Faults) -> Task:
     reader = replace(reader, components=components)
     actions = faults.each(members["actions"].elements(), reader.action)
     no_goal: Condition = TRUE
+    origin = read_task(members["origin"], faults) if "origin" in members else None
     task = Task(
         domain=faults.attempt(members["domain"].string, ""),
         problem=faults.attempt(members["problem"].string, ""),
@@ -307,7 +289,12 @@ def read_task(at: At, faults: Faults) -> Task:
             )
         ),
         components=components,
-        origin=read_task(members["origin"], faults) if "origin" in members else None,
+        origin=origin,
+        true_worlds=(
+            tuple(faults.each(_optional(members, "true_worlds"), true_world))
+            if origin is None
+            else origin.true_worlds
+        ),
     )
     faults.stop_if_any()
     check_sum(members["initial"], [state.probability for state in task.initial])
@@ -337,16 +324,12 @@ def _check_distinct(at: At, names: Sequence[str]) -> None:
             raise at.fault("BBT0607", f"'{clip(name)}' stands twice")
 
 
-def _strings(at: At) -> tuple[str, ...]:
-    return tuple(element.string() for element in at.elements())
-
-
 def _variable(at: At) -> Variable:
     members = at.members(["name", "values"], ["hidden", "predicate", "args"])
     name = members["name"].string()
     if "predicate" in members or "args" in members:
         at.members(["predicate", "args"], list(members))  # both or neither
-        predicate, args = members["predicate"].string(), _strings(members["args"])
+        predicate, args = members["predicate"].string(), members["args"].strings()
     else:
         predicate, args = split_name(name)
     _check_name(members["name"], predicate, args)
@@ -368,7 +351,7 @@ def _signature(at: At) -> Signature:
     kind: Literal["predicate", "action"] = (
         "action" if members["kind"].word("predicate", "action") == "action" else "predicate"
     )
-    return Signature(kind, members["symbol"].string(), _strings(members["parameters"]))
+    return Signature(kind, members["symbol"].string(), members["parameters"].strings())
 
 
 @dataclass(frozen=True, slots=True)
@@ -387,7 +370,7 @@ class _Reader:
 
     def component(self, at: At) -> Component:
         members = at.members(["facts", "prior", "known"], ["seen", "first"])
-        facts, seen = _strings(members["facts"]), self._seen(members)
+        facts, seen = members["facts"].strings(), self._seen(members)
         _check_distinct(members["facts"], sorted(facts))
         local = self._local(facts, seen)
         prior, diagram = prior_from_json(members["prior"], {fact: at for at, fact in enumerate(facts)})
@@ -418,11 +401,12 @@ class _Reader:
         return _Reader.of((*hidden, *(self.variables[variable] for variable in seen)))
 
     def observation(self, at: At) -> Observation:
-        members = at.members(["condition"], ["when", "accuracy"])
+        members = at.members(["condition"], ["when", "accuracy", "accuracy_false"])
         return Observation(
             self.condition(members["condition"]),
             members["accuracy"].given_probability() if "accuracy" in members else _ONE,
             self.condition(members["when"]) if "when" in members else None,
+            members["accuracy_false"].given_probability() if "accuracy_false" in members else None,
         )
 
     def change(self, at: At) -> Change:
@@ -462,7 +446,7 @@ class _Reader:
         members = at.members(
             ["name", "schema", "args", "cost", "precondition"], ["outcomes", "factors", "oneof", "changes"]
         )
-        schema, args = members["schema"].string(), _strings(members["args"])
+        schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
         return GroundAction(
             schema,
@@ -519,7 +503,7 @@ class _Reader:
 
     def template(self, at: At) -> GroundTemplate:
         members = at.members(_TEMPLATE_FIELDS, ["outcomes", "factors", "oneof"])
-        symbol, args = members["template"].string(), _strings(members["args"])
+        symbol, args = members["template"].string(), members["args"].strings()
         _check_name(members["name"], symbol, args)
         return GroundTemplate(
             symbol,

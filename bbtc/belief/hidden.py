@@ -43,13 +43,13 @@ def beliefs_of(component: Component) -> Beliefs:
     return found
 
 
-def refuse_hidden(task: Task, done: str) -> None:
+def refuse_hidden(task: Task, done: str, hint: str | None = None) -> None:
     """Raise :class:`bbtc.diagnostics.BbtcError` (BBT0506) for a task with hidden facts, which cannot be
     ``done`` to it."""
     if task.components:
         fact = task.components[0].facts[0]
-        message = f"a task with hidden facts, such as {fact}, cannot be {done} yet"
-        raise BbtcError.single("BBT0506", message)
+        message = f"a task with hidden facts, such as {fact}, cannot be {done}"
+        raise BbtcError.single("BBT0506", message, hint=hint)
 
 
 # --- in the values of a state ------------------------------------------------------------------

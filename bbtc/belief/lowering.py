@@ -58,6 +58,8 @@ def lowered(task: Task, limits: Limits) -> Task:
         if len(task.components[number].facts) == 1 and len(task.components[number].known) == 1
     }
     lower = replace(_without(task, found), unlowered=task)
+    if task.true_worlds:  # runs begin in one of them, which has to be kept
+        return replace(lower, origin=task)
     return lower if len(alone) == len(found) else replace(lower, origin=_without(task, alone))
 
 

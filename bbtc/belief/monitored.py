@@ -6,8 +6,10 @@ The table has what the runs of the tree reach, and nothing else: no weights, no 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
+from math import prod
 
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.draws import Values, unbounded
@@ -15,8 +17,9 @@ from bbtc.belief.hidden import Readings, beliefs_of, case_of, number_in
 from bbtc.belief.state import initial_belief
 from bbtc.belief.worlds.kernel import Reading
 from bbtc.diagrams import ONE, Diagram, Diagrams
-from bbtc.ground.condition import Condition, replaced, variables
+from bbtc.ground.condition import TRUE, Condition, conjunction, negation, replaced, variables
 from bbtc.ground.describe import describe
+from bbtc.ground.hidden.given import given_worlds
 from bbtc.ground.task import (
     NO_CHANGE,
     Change,
@@ -33,6 +36,7 @@ from bbtc.ground.task import (
 )
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.markov import distribution, independent
 from bbtc.tree.monitor import FIRST, Monitor, Move, Part, Row, Sets, Telling, Turn, Walk
 from bbtc.tree.nodes import ActionNode, ConditionNode, Node, Tree, actions_of, walk
 
@@ -54,7 +58,7 @@ def monitored(tree: Tree, limits: Limits) -> Tree | None:
     chain = explore(task, tree.root, limits)
     names = ObservationNames(task)
     tables = _Tables(task, chain, names, limits)
-    world = _World(task, tree.root, parts, names)
+    world = _World(task, tree.root, parts, names, limits)
     monitor = Monitor(
         tuple(map(tables.part, parts)), tuple(world.priors()), tuple(world.tellings()), tuple(world.walks())
     )
@@ -217,8 +221,10 @@ def told_as(told: int | None) -> Truth:
 class _World:
     """A task whose variables tell what is true."""
 
-    def __init__(self, task: Task, root: Node, parts: Sequence[int], names: ObservationNames) -> None:
-        self._task, self._parts, self._names = task, parts, names
+    def __init__(
+        self, task: Task, root: Node, parts: Sequence[int], names: ObservationNames, limits: Limits
+    ) -> None:
+        self._task, self._parts, self._names, self._limits = task, parts, names, limits
         self._actions = sorted({node.action for node in actions_of(root)})
         changed = {change.component for name in self._actions for change in changes_of(task, name)}
         word = _TRUE
@@ -247,23 +253,53 @@ class _World:
         )
 
     def priors(self) -> Iterator[tuple[Sets, ...]]:
-        """What may be true at the start, for each component whose worlds are listed."""
-        for component, first in self._first.items():
-            if self._task.components[component].diagram is not None:
+        """What may be true at the start: for each component, or, where the problem gives several worlds in
+        which components differ, for these together."""
+        given = [[each or {} for each in worlds] for worlds in given_worlds(self._task)]
+        together = []
+        for component in self._first:
+            if self._walked(component):
                 continue
-            facts = range(len(self._task.components[component].facts))
-            yield tuple(
-                Sets(p, tuple((first + bit, Truth.of(bool(world >> bit & 1))) for bit in facts))
-                for world, p in self._task.components[component].prior
-                if p
+            every = [each[component] for each in given] or [dict(self._task.components[component].prior)]
+            if any(each != every[0] for each in every):
+                together.append(component)
+            else:
+                yield tuple(self._sets({component: world}, p) for world, p in every[0].items() if p)
+        if together:
+            ways = (prod(len(each[component]) for component in together) for each in given)
+            self._limits.check_states(sum(ways), "writing down what is true")
+            drawn = distribution(
+                (worlds, p / len(given))
+                for each in given
+                for worlds, p in independent([each[component] for component in together])
             )
+            yield tuple(
+                self._sets(dict(zip(together, worlds, strict=True)), p) for worlds, p in drawn.items()
+            )
+
+    def _sets(self, worlds: Mapping[int, int], probability: Fraction) -> Sets:
+        """The facts of some components as in their worlds."""
+        return Sets(
+            probability,
+            tuple(
+                (self._first[component] + bit, Truth.of(bool(world >> bit & 1)))
+                for component, world in worlds.items()
+                for bit in range(len(self._task.components[component].facts))
+            ),
+        )
 
     def walks(self) -> Iterator[Walk]:
         """The same of the others."""
         for component, first in self._first.items():
             diagram = self._task.components[component].diagram
-            if diagram is not None:
+            if diagram is not None and self._walked(component):
                 yield _walk(diagram, first)
+
+    def _walked(self, component: int) -> bool:
+        """Is it drawn from a diagram what is true of a component?"""
+        given = given_worlds(self._task)
+        listed = self._task.components[component].diagram is None
+        return not listed and (not given or any(each[component] is None for each in given))
 
     def tellings(self) -> Iterator[Telling]:
         """What the actions tell."""
@@ -274,8 +310,17 @@ class _World:
                 names = self._names.of(action, change.component)
                 for name, observation in zip(names, change.observations, strict=True):
                     when = None if observation.when is None else self._moved(observation.when, change)
-                    told = Observation(self._moved(observation.condition, change), observation.accuracy, when)
-                    yield Telling(action, name, told)
+                    condition = self._moved(observation.condition, change)
+                    told = Observation(condition, observation.accuracy, when)
+                    if observation.accuracy_false is None:
+                        yield Telling(action, name, told)
+                        continue
+                    # Two, of which one is made.
+                    whether = TRUE if when is None else when
+                    yield Telling(action, name, replace(told, when=conjunction([whether, condition])))
+                    otherwise = conjunction([whether, negation(condition)])
+                    accuracy = observation.accuracy_false
+                    yield Telling(action, name, replace(told, accuracy=accuracy, when=otherwise))
 
     def _action(self, action: GroundAction) -> GroundAction:
         factors = [factor for factor in action.factors if factor != NO_CHANGE]

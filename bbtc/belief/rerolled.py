@@ -31,7 +31,7 @@ def rerolled(task: Task, chain: Chain) -> tuple[str, ...]:
 def _noisy(task: Task, action: str) -> Iterator[tuple[int, Observation]]:
     for change in task.action_by_name[action].changes:
         for observation in change.observations:
-            if 0 < observation.accuracy < 1:
+            if observation.noisy:
                 yield change.component, observation
 
 

@@ -38,7 +38,7 @@ class Figures:
     root succeeds, but the goal is not true: what is hidden was taken for true) sum to 1. Costs and numbers of
     actions are expectations; None is infinite, or, given success, undefined because success is
     impossible. ``worst`` is the worst world that hidden facts may make at the start; None where nothing is
-    hidden, or that was not worked out."""
+    hidden, or that was not worked out, for the reason that ``worst_untold`` tells."""
 
     success: Fraction
     failure: Fraction
@@ -53,6 +53,7 @@ class Figures:
     states: int
     mistaken: Fraction = Fraction(0)
     worst: WorstWorld | None = None
+    worst_untold: str | None = None
 
 
 def simulate(task: Task, root: Node, limits: Limits) -> Figures:

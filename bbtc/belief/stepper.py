@@ -85,10 +85,16 @@ class Stepper:
         return self.now.action is None
 
     def start(self, choice: int | None = None) -> None:
-        """Begin again: in the initial state number ``choice`` (from 0), or in a drawn one."""
-        starts = self.starts
-        values = starts[self._draw(starts, 0) if choice is None else choice].values
-        self.moments = [self._tick(State(values, 0), self.truth.first(values))]
+        """Begin again: in the initial state number ``choice`` (from 0), or in a drawn one. What is true is
+        as the problem says, as far as it says that and it can be in that state."""
+        starts, given = self.starts, self.truth.given()
+        real = starts
+        if given is not None:
+            chances = (each.probability * self.truth.begins(each.values, given) for each in starts)
+            real = tuple(Branch(p, each.values) for p, each in zip(chances, starts, strict=True))
+        begun = real[self._draw(real, 0) if choice is None else choice]
+        worlds = given if given is not None and begun.probability else self.truth.first(begun.values)
+        self.moments = [self._tick(State(begun.values, 0), worlds)]
 
     def step(self, choice: int | None = None) -> None:
         """Take outcome number ``choice`` (from 0) of the running action, or a drawn one, and tick."""

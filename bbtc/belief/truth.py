@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from bbtc.belief.draws import Values, unbounded
 from bbtc.belief.hidden import Readings, beliefs_of, case_of, number_in
-from bbtc.ground.task import ONE, Change, Task
+from bbtc.ground.hidden.given import given_worlds
+from bbtc.ground.task import ONE, ZERO, Change, Task
 from bbtc.markov import distribution
 
 Worlds = tuple[int, ...]
@@ -37,6 +38,38 @@ class HiddenTruth:
     def first(self, values: Values) -> Worlds:
         """The worlds of an initial state, or of any other."""
         return tuple(self._drawn(values, component, 0) for component in range(len(self.task.components)))
+
+    def given(self) -> Worlds | None:
+        """The worlds that a run begins in, drawn among those that the problem gives; None where it gives
+        none."""
+        every = given_worlds(self.task)
+        if not every:
+            return None
+        picked = self._pick(((number, ONE) for number in range(len(every))), "given")
+        return tuple(
+            beliefs.pick(beliefs.prior, self._point(f"given:{at}"))
+            if found is None
+            else self._pick(found.items(), f"given:{at}")
+            for at, (beliefs, found) in enumerate(
+                zip(map(beliefs_of, self.task.components), every[picked], strict=True)
+            )
+        )
+
+    def begins(self, values: Values, worlds: Worlds) -> Fraction:
+        """How much more probable an initial state is in these worlds than as far as is known, by what the
+        robot is told at first."""
+        before, chance = bytearray(values), ONE
+        for component in self.task.components:
+            for each in component.known:
+                before[each.variable] = self.task.initial[0].values[each.variable]
+        for number, (component, world) in enumerate(zip(self.task.components, worlds, strict=True)):
+            change = Change(number, component.seen, (), component.first)
+            case = beliefs_of(component).prior, bytes(before[variable] for variable in change.seen)
+            readings, told = Readings(self.task, change, unbounded), number_in(self.task, values, number)
+            fits = sum((p for _, belief, _, p in readings.in_world(*case, world) if belief == told), ZERO)
+            known = (each.probability for each in readings.after(*case) if each.belief == told)
+            chance *= fits / sum(known, ZERO)
+        return chance
 
     def chance(self, action: str, values: Values, worlds: Worlds, after: Values) -> Fraction:
         """How much more probable it is in these worlds than as far as is known, that an action leads from one

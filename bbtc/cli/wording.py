@@ -72,8 +72,10 @@ def simplified_line(last: Refinement, tree: Tree) -> list[str]:
 
 
 def worst_world_line(figures: Figures) -> list[str]:
-    """What a tree attains in the worst world, where that is less than in the mean."""
+    """What a tree attains in the worst world, where that is less than in the mean, or why nobody knows."""
     worst = figures.worst
+    if figures.worst_untold is not None:
+        return [f"the worst world is not told: {figures.worst_untold}"]
     if worst is None or worst.success == figures.success:
         return []
     return [f"success probability {exact(worst.success)} {worst_world(worst)}, the worst world"]
@@ -149,6 +151,8 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
         alike = figures.worst.success == figures.success
         where = "in every world" if alike else worst_world(figures.worst)
         lines.append(f"worst     {exact(figures.worst.success)} {where}")
+    if figures.worst_untold is not None:
+        lines.append(f"worst     not told: {figures.worst_untold}")
     for share in figures.failures:
         what = stopped(tree, share.node, share.condition, share.status)
         lines.append(f"  {exact(share.probability)}: {what}, node {share.node}")

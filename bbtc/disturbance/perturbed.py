@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from bbtc.belief.draws import Values
-from bbtc.belief.hidden import refuse_hidden
+from bbtc.belief.hidden import chance_of
 from bbtc.belief.state import initial_belief
 from bbtc.belief.tick import STARTED, NodeStatus, compile_tick, memory_of
 from bbtc.disturbance.execution import careful_actions
@@ -127,7 +127,8 @@ _NOTHING = Draw(())
 
 class _Node:
     """A state in which the tree is ticked, and what may come next. ``status`` is the root's; of a started
-    action ``draw`` and ``next`` say what it leads to, and ``costs`` at what scaled cost."""
+    action ``draw`` and ``next`` say what it leads to, and ``costs`` at what scaled cost; of an end ``won`` is
+    how probably the goal is true."""
 
     __slots__ = ("change", "changed", "costs", "draw", "memory", "next", "ready", "status", "values", "won")
 
@@ -136,10 +137,10 @@ class _Node:
         self.change: Draw | None = None
         self.changed: list[_Node] = []
         self.status = -1
-        self.ready = self.won = False
+        self.ready, self.won = False, Fraction(0)
         self.draw = _NOTHING
         self.next: list[_Node] = []
-        self.costs: list[int] = []
+        self.costs: list[Fraction | int] = []
 
 
 class _Sampler:
@@ -149,7 +150,7 @@ class _Sampler:
         self.limits = limits
         self._facts = facts
         self._tick = compile_tick(task, root)
-        self._goal = compile_condition(task.goal)
+        self._goal = _goal_of(task)
         actions = [task.action_by_name[node.action] for node in actions_of(root)]
         self._ready = [compile_condition(action.precondition) for action in actions]
         careful = careful_actions(task, root, limits)
@@ -158,7 +159,7 @@ class _Sampler:
         self.scale = math.lcm(1, *(cost.denominator for action in actions for cost in _costs(action)))
         self._nodes: dict[tuple[Values, int], _Node] = {}
         self._after: dict[Values, tuple[Draw, list[Values]]] = {}
-        self._outcome: dict[tuple[int, Values], tuple[Draw, list[int], list[Values]]] = {}
+        self._outcome: dict[tuple[int, Values], tuple[Draw, list[Fraction | int], list[Values]]] = {}
         belief = list(initial_belief(task).items())
         self.start = Draw(chance for _, chance in belief)
         self._starts = [values for values, _ in belief]
@@ -184,7 +185,7 @@ class _Sampler:
         """The root's status in a state that is ticked for the first time."""
         status = node.status = self._tick(node.values, node.memory)
         if status == NodeStatus.SUCCESS:
-            node.won = self._goal(node.values) == Truth.TRUE
+            node.won = self._goal(node.values)
         if status >= STARTED:
             action = self._memory.action(status)
             node.ready = self._ready[action](node.values) == Truth.TRUE
@@ -193,14 +194,15 @@ class _Sampler:
             node.next = [self._node(values, memory) for values in after]
         return status
 
-    def _outcomes(self, action: int, state: Values) -> tuple[Draw, list[int], list[Values]]:
+    def _outcomes(self, action: int, state: Values) -> tuple[Draw, list[Fraction | int], list[Values]]:
         """What an action may lead to, and at what scaled cost; whatever the tree remembers."""
         key = (action, state)
         found = self._outcome.get(key)
         if found is None:
             results = self._run[action](state)
             draw = Draw(result.probability for result in results)
-            costs = [int(result.cost * self.scale) for result in results]
+            scaled = [result.cost * self.scale for result in results]
+            costs = [int(cost) if cost.denominator == 1 else cost for cost in scaled]  # these are quick
             found = self._outcome[key] = draw, costs, [result.values for result in results]
         return found
 
@@ -234,18 +236,23 @@ def perturbed_runs(
         raise ValueError(f"the rate {rate} is not between 0 and 1")
     if runs < 1 or most_ticks < 1:
         raise ValueError("there must be at least one run of at least one tick")
-    refuse_hidden(task, "perturbed")
-    facts = ChangingFacts.of(task, limits)
+    # What is hidden stays as the model has it, and with it what is believed: exactly right, since the robot
+    # sees all that others change.
+    hidden = (number for number, variable in enumerate(task.variables) if variable.hidden)
+    facts = ChangingFacts.of(task, limits).but(hidden)
     sampler = _Sampler(task, root, facts, limits)
     below = threshold(rate)
     count = dict.fromkeys(_Ending, 0)
-    starts = unready = changes = cost = won_cost = 0
+    starts = unready = changes = 0
+    cost: Fraction | int = 0
+    won_cost: Fraction | int = 0
     for run in range(runs):
         if run % 64 == 0:
             limits.check_time(_DOING, run)
         bits = bits_of(seed, run)
         first = sampler.starts()
-        node, own, ending = first[sampler.start(bits())], 0, _Ending.CUT
+        node, ending = first[sampler.start(bits())], _Ending.CUT
+        own: Fraction | int = 0
         for _ in range(most_ticks):
             if bits() < below:
                 draw = node.change or sampler.changes(node)
@@ -255,7 +262,8 @@ def perturbed_runs(
                     changes += 1
             status = node.status if node.status >= 0 else sampler.ticked(node)
             if status < STARTED:
-                ending = _ENDINGS[NodeStatus(status), node.won]
+                won = node.won == 1 or (node.won > 0 and bits() < threshold(node.won))
+                ending = _ENDINGS[NodeStatus(status), won]
                 break
             starts += 1
             unready += not node.ready
@@ -279,13 +287,21 @@ def perturbed_runs(
         starts=starts,
         unready=unready,
         changes=changes,
-        cost=Fraction(cost, sampler.scale * runs),
-        cost_given_success=Fraction(won_cost, sampler.scale * successes) if successes else None,
+        cost=Fraction(cost) / (sampler.scale * runs),
+        cost_given_success=Fraction(won_cost) / (sampler.scale * successes) if successes else None,
         actions=Fraction(starts, runs),
         interval=wilson(successes, runs),
         facts=sum(len(each.variables) for each in facts.movables),
         groups=sum(len(each.variables) > 1 for each in facts.movables),
     )
+
+
+def _goal_of(task: Task) -> Callable[[Values], Fraction]:
+    """How probable it is in a state that the goal is true."""
+    if task.components:
+        return lambda values: chance_of(task, task.goal, values)
+    goal = compile_condition(task.goal)
+    return lambda values: Fraction(goal(values) == Truth.TRUE)
 
 
 def _costs(action: GroundAction) -> Iterator[Fraction]:

@@ -2,9 +2,9 @@
 possible.
 
 The states are all that any actions of the task lead to, those behind the goal included, or a uniform sample
-of them. From each, a tree that remembers nothing is run in the undisturbed world (but for starts without
-precondition, :mod:`bbtc.disturbance.execution`), and its success probability is compared with P* of that
-state.
+of them; where facts are hidden, states of what is seen and what is believed. From each, a tree that
+remembers nothing is run in the undisturbed world (but for starts without precondition,
+:mod:`bbtc.disturbance.execution`), and its success probability is compared with P* of that state.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain, explore
 from bbtc.belief.draws import Values
 from bbtc.belief.failures import FailureFinder
-from bbtc.belief.hidden import refuse_hidden
+from bbtc.belief.hidden import chance_of, refuse_hidden
 from bbtc.belief.tick import NodeStatus
 from bbtc.disturbance.execution import careful_actions
 from bbtc.disturbance.intervals import Interval, score, wilson
@@ -110,7 +110,6 @@ def recovery(
     states than the limits allow."""
     if samples is not None and samples < 1:
         raise ValueError("there must be at least one sample")
-    refuse_hidden(task, "started from other states")
     space = explore_space(replace(task, goal=FALSE), limits)  # so that the goal ends nothing
     space.require_complete()
     best = max_prob(space, limits, holds(space.packing, bit_test(space.packing, task.goal), space.states))
@@ -130,8 +129,7 @@ def _taken(count: int, samples: int | None, seed: int) -> Sequence[int]:
 
 
 def _values(space: StateSpace, rows: Sequence[int]) -> list[Values]:
-    unpacked = space.packing.unpack(space.states[np.array(rows, dtype=np.int64)])
-    return [bytes(values) for values in unpacked.tolist()]
+    return space.packing.values(space.states[np.array(rows, dtype=np.int64)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +146,7 @@ def _figures(task: Task, root: Node, limits: Limits, found: _Found) -> Recovery:
     chain, best = found.chain, found.best
     limits.check_time("the recovery")
     absorption, goal = Absorption(chain), compile_condition(task.goal)
+    _refuse_guesses(task, chain)
     won = [
         end
         for end in chain.final
@@ -185,6 +184,16 @@ def _figures(task: Task, root: Node, limits: Limits, found: _Found) -> Recovery:
         attained_interval=wilson(attained, len(ratios)) if sampled else None,
         mean_interval=score(mean, max(variance, mean * (1 - mean)), len(ratios)) if sampled else None,
     )
+
+
+def _refuse_guesses(task: Task, chain: Chain) -> None:
+    """P* of a state is that of who stops at a goal that he knows."""
+    for end in chain.final:
+        values = chain.states[end].values
+        if chain.status[end] is NodeStatus.SUCCESS and 0 < chance_of(task, task.goal, values) < 1:
+            refuse_hidden(
+                task, "started from other states by a tree that stops where it only believes its goal"
+            )
 
 
 def _in_reach(found: _Found, ends: Sequence[int]) -> set[int]:

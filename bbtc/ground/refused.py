@@ -14,7 +14,10 @@ from bbtc.model.hidden import has_hidden_state
 
 _START = "facts, `(unknown …)`, `(probabilistic …)`, `(oneof …)` and `(or …)` can"
 
-_NOISY = "a noisy reading is written `(probabilistic q (p))`: right with q, whichever the truth"
+_NOISY = (
+    "a noisy reading is written `(probabilistic q (p))`: right with q, whichever the truth; or "
+    "`(probabilistic q (p) r (not (p)))`: right with q where `(p)` is true, with r where it is false"
+)
 
 _FACTS = "the robot knows what it knows: `(unknown …)` and `(known …)` belong into conditions"
 
@@ -64,12 +67,20 @@ def refused(model: md.Model) -> Iterator[Diagnostic]:
         )
 
 
-def noise(observed: me.Choice) -> tuple[me.Set, Fraction] | None:
-    """The fact that a noisy reading tells, and the probability that it is right; None for other forms."""
+def noise(observed: me.Choice) -> tuple[me.Set, Fraction, Fraction | None] | None:
+    """The fact that a noisy reading tells, and the probability that it is right, where it is true, and, if
+    that differs, where it is false; None for other forms."""
+    sets = [each.effect for each in observed.branches if isinstance(each.effect, me.Set)]
     told = [branch for branch in observed.branches if not isinstance(branch.effect, me.Together)]
-    if observed.oneof or len(told) != 1 or not isinstance(told[0].effect, me.Set):
+    if observed.oneof or len(sets) != len(told):
         return None
-    return told[0].effect, told[0].probability
+    if len(told) == 1:
+        return sets[0], told[0].probability, None
+    if not me.both_ways(sets):
+        return None
+    right = {each.value: branch.probability for each, branch in zip(sets, told, strict=True)}
+    true, false = right[Truth.TRUE], right[Truth.FALSE]
+    return sets[0], true, None if false == true else false
 
 
 def _is_no_fact(model: md.Model, reading: mf.Reading) -> bool:

@@ -111,12 +111,22 @@ MISREAD = "misread "
 @dataclass(frozen=True, slots=True)
 class Observation:
     """The robot is told whether ``condition`` is true, if ``when`` is (None: always): rightly with
-    probability ``accuracy``, whichever the truth, and else wrongly. Both are read in the state after the
-    action; they are two-valued there."""
+    probability ``accuracy``, and else wrongly; where it is false, rightly with ``accuracy_false``, unless
+    that is None. Both are read in the state after the action; they are two-valued there."""
 
     condition: Condition
     accuracy: Fraction = Fraction(1)
     when: Condition | None = None
+    accuracy_false: Fraction | None = None
+
+    def right(self, true: bool) -> Fraction:
+        """How probably it is right, where the condition is true, or false."""
+        return self.accuracy if true or self.accuracy_false is None else self.accuracy_false
+
+    @property
+    def noisy(self) -> bool:
+        """Is it left to chance what is told?"""
+        return any(self.right(true) not in (0, 1) for true in (True, False))
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,6 +281,15 @@ class InitialState:
     values: tuple[Truth, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class TrueWorld:
+    """What is true, and what is false, of the hidden facts at the start of a simulated run, by name; others
+    are false, if that can be."""
+
+    true: frozenset[str]
+    false: frozenset[str] = frozenset()
+
+
 @dataclass(frozen=True)
 class Task:
     """A ground planning task. Actions, templates and variables are sorted by name, signatures by
@@ -296,6 +315,9 @@ class Task:
     unlowered: Task | None = field(default=None, compare=False, repr=False)
     """The task with all hidden facts that this was made of, over the same variables, as long as it is at
     hand: artefacts do not hold it."""
+    true_worlds: tuple[TrueWorld, ...] = ()
+    """What the problem says is true at the start of simulated runs, which begin in one of them. Nothing else
+    reads it."""
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property
@@ -313,7 +335,7 @@ class Task:
         """May ever new beliefs follow from each other, since readings are noisy or hidden facts change by
         chance?"""
         changes = [change for action in self.actions for change in action.changes]
-        noisy = any(each.accuracy not in (0, 1) for change in changes for each in change.observations)
+        noisy = any(each.noisy for change in changes for each in change.observations)
         return noisy or any(len(factor.outcomes) > 1 for change in changes for factor in change.factors)
 
     @cached_property

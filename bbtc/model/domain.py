@@ -70,11 +70,12 @@ class Schema:
 @dataclass(frozen=True, slots=True)
 class Reading:
     """Where ``when`` holds after an action, it is told whether ``condition`` is true, rightly with the
-    probability ``accuracy``."""
+    probability ``accuracy``; where it is false with ``accuracy_false``, unless that is None."""
 
     condition: Formula
     accuracy: Fraction
     when: Formula
+    accuracy_false: Fraction | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,6 +239,9 @@ class Model:
     """By the predicate that stands for each."""
     may_fail: bool = False
     """Preconditions on what is hidden are about the world: where they are false, actions change nothing."""
+    true_worlds: tuple[tuple[InitialFact, ...], ...] = ()
+    """What is true at the start of simulated runs, one of several: ``:hidden``, and ``:init`` beside
+    ``:init-belief``. Facts that are not mentioned are false."""
     symbols: tuple[str, ...] = ()
     """Predicates that stand for what is told, and for nothing else."""
     requirements: Mapping[str, Span] = field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal, TypeAlias
@@ -131,6 +131,15 @@ def walk(effect: Effect, *, possible: bool = False) -> Iterator[Effect]:
                 waiting += (b.effect for b in reversed(branches) if not possible or b.probability > 0)
             case _:
                 assert_never(each)
+
+
+def both_ways(effects: Sequence[Effect]) -> bool:
+    """Are these two, of which one makes true what the other makes false?"""
+    match effects:
+        case [Set(predicate, args, Truth() as one), Set(other, others, Truth() as two)]:
+            return (predicate, args) == (other, others) and {one, two} == {Truth.TRUE, Truth.FALSE}
+        case _:
+            return False
 
 
 def leaves(effect: Effect, *, possible: bool = False) -> Iterator[Set | Add]:

@@ -63,8 +63,16 @@ def task_value(
         within = best_within(task, limits, steps)
         return _value(within.horizon.space, within.bounds, max_actions=steps, stop=within.stop)
     except LimitReached as reached:
-        stop = reached.diagnostics[0]
-        return TaskValue(Fraction(0), Fraction(1), 0, 0, 0, max_actions=steps, stop=stop)
+        stop, known = reached.diagnostics[0], bounds_of(reached)
+        return TaskValue(known.lower, known.upper, 0, 0, 0, max_actions=steps, stop=stop)
+
+
+def bounds_of(reached: LimitReached) -> Bounds:
+    """What was known of P* when a limit was met."""
+    from bbtc.planner.mdp.maxprob import Bounds
+    from bbtc.planner.mdp.solve import OnlyBounds
+
+    return reached.bounds if isinstance(reached, OnlyBounds) else Bounds(Fraction(0), Fraction(1))
 
 
 def _without_end(task: Task, limits: Limits, *, costs: bool, target: Fraction | None) -> TaskValue:
@@ -132,10 +140,11 @@ def judged(plan: Plan, limits: Limits, options: Options = DEFAULTS) -> Plan:
     return replace(plan, tree=replace(tree, status=status, bounds=(lower, upper)))
 
 
-def unjudged(plan: Plan) -> Plan:
+def unjudged(plan: Plan, reached: LimitReached) -> Plan:
     """The plan with the bounds that hold without looking, where a limit ended planning before it had any:
-    what the tree does itself, and 1."""
+    what the tree does itself, and what was known then."""
     tree = plan.tree
     if tree.status != "limit-reached" or tree.bounds is not None:
         return plan
-    return replace(plan, tree=replace(tree, bounds=(tree.success_probability, Fraction(1))))
+    own = tree.success_probability
+    return replace(plan, tree=replace(tree, bounds=(own, max(own, bounds_of(reached).upper))))

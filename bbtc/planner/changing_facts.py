@@ -9,8 +9,8 @@ that a can that falls from the gripper leaves it empty.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from bbtc.belief.draws import Values
@@ -58,6 +58,8 @@ class ChangingFacts:
     groups: tuple[Group, ...]
     _around: Mapping[int, tuple[int, ...]]
     """The numbers of the groups that each variable is in."""
+    _fixed: frozenset[int] = frozenset()
+    """Variables that stay as they are."""
 
     @classmethod
     def of(cls, task: Task, limits: Limits) -> ChangingFacts:
@@ -82,6 +84,12 @@ class ChangingFacts:
                 around[member] = (*around.get(member, ()), number)
         return cls(tuple(movables), tuple(groups), around)
 
+    def but(self, fixed: Iterable[int]) -> ChangingFacts:
+        """The same, but that some variables never change: what would take them along does not happen."""
+        found = frozenset(fixed)
+        left = tuple(each for each in self.movables if not found.issuperset(each.variables))
+        return replace(self, movables=left, _fixed=found)
+
     def changes(self, state: Values) -> tuple[tuple[Fraction, Values], ...]:
         """Where one change may lead from a state, and how probably: whatever may move is as likely to do so,
         then each of the values that it may take, then each way for other facts to give way. Empty where
@@ -105,8 +113,13 @@ class ChangingFacts:
         ways: list[list[list[Values]]] = []
         for movable in self.movables:
             found = [self._settled(state, sets, holding) for sets in movable.moves(state)]
+            if self._fixed:
+                found = [[after for after in each if self._keeps(state, after)] for each in found]
             ways.append([each for each in found if each])
         return [each for each in ways if each]
+
+    def _keeps(self, state: Values, after: Values) -> bool:
+        return all(after[variable] == state[variable] for variable in self._fixed)
 
     def _settled(self, state: Values, sets: _Sets, holding: Sequence[Sequence[int]]) -> list[Values]:
         """The states after a move with the fewest other facts changed, so that no group is contradicted; none

@@ -9,7 +9,8 @@ from bbtc.belief.draws import Values, unbounded
 from bbtc.belief.hidden import Readings, beliefs_of, number_in
 from bbtc.belief.monitored import ObservationNames, changes_of, with_hidden
 from bbtc.belief.scenarios import Scenario
-from bbtc.ground.task import Change, Task
+from bbtc.ground.task import Change, Task, effects_of
+from bbtc.kleene import Truth
 from bbtc.replay.script import Run, Script, Told, script_of
 from bbtc.tree.monitor import FIRST
 from bbtc.tree.nodes import Tree
@@ -66,11 +67,15 @@ class Tellings:
         if key not in self._readings:
             self._readings[key] = Readings(self._task, change, unbounded)
         seen = bytes(before[variable] for variable in change.seen)
+        # What the action sets besides is not told of here; where both do, the greatest of the values wins.
+        drawn = self._task.action_by_name[action].factors if action != FIRST else ()
+        besides = {variable for effect in effects_of(drawn) for variable, _ in effect.sets}
         for reading in self._readings[key].after(number, seen):
-            then = bytearray(seen)
-            for at, value in reading.shown:
-                then[at] = value
-            if reading.belief == number_in(self._task, after, component) and bytes(then) == bytes(
-                after[variable] for variable in change.seen
+            shown = dict(reading.shown)
+            if reading.belief == number_in(self._task, after, component) and all(
+                after[variable] >= shown.get(at, Truth.FALSE)
+                if variable in besides
+                else after[variable] == shown.get(at, seen[at])
+                for at, variable in enumerate(change.seen)
             ):
                 yield reading.told

@@ -14,7 +14,7 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from bbtc.ground.condition import variables
-from bbtc.ground.task import Charge, Effect, Factor, GroundAction, Outcome, Task, charges_of, effects_of
+from bbtc.ground.task import Charge, Effect, Factor, GroundAction, Task, charges_of, effects_of
 from bbtc.verifier.conditions import FALSE, TRUE, UNKNOWN, where_true
 from bbtc.verifier.program import (
     NO,
@@ -38,7 +38,7 @@ MOST_BRANCHES = 64
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _Amounts: TypeAlias = tuple[Fraction, Fraction, Fraction]  # actions, cost, reward
-_Drawn: TypeAlias = tuple[Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction]
+Drawn: TypeAlias = tuple[Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction]
 
 
 def relevant(task: Task, actions: Iterable[GroundAction], read: Iterable[int]) -> list[int]:
@@ -76,7 +76,7 @@ class Outcomes:
 
     def prepare(self, actions: Sequence[GroundAction]) -> None:
         """Write the stages of those actions that need them."""
-        staged = [action for action in actions if _combinations(action.factors) > self.most_branches]
+        staged = [action for action in actions if combinations(action.factors) > self.most_branches]
         if not staged:
             return
         self.stage = self.draft.cell(Cell("control", "stage", "stage of the outcome being drawn; 0: none", 0))
@@ -90,10 +90,7 @@ class Outcomes:
             self._entry[action.name] = self._series(action.factors, 1)
         highest = self._stages
         self.draft.cells[self.stage] = Cell("control", "stage", self.draft.cells[self.stage].meaning, highest)
-        apply = [
-            Choose(self.cell_of[v], tuple((Compare(p, "=", value + 1), value) for value in (0, 1, 2)))
-            for v, p in self._pending.items()
-        ]
+        apply = [applied(self.cell_of[v], p) for v, p in self._pending.items()]
         clear = [put(pending, 0) for pending in self._pending.values()]
         after = Branch(_ONE, (*apply, *clear, put(self.stage, 0)), (_ZERO, _ZERO, _ZERO))
         self.commands.append(Command(None, Compare(self.stage, "=", 1), (after,), "the outcome applies"))
@@ -110,10 +107,10 @@ class Outcomes:
             rewards = (_ONE, action.cost, _ZERO)
             return (Branch(_ONE, (*updates, put(self.stage, self._entry[action.name])), rewards),)
         merged: dict[tuple[tuple[Update, ...], _Amounts, tuple[Charged, ...]], Fraction] = {}
-        for probability, effects, charges, cost, reward in _draws(action.factors):
+        for probability, effects, charges, cost, reward in draws(action.factors):
             if probability:
                 amounts = (_ONE, action.cost + cost, reward)
-                key = ((*updates, *self._set(effects)), amounts, self._charges(charges))
+                key = ((*updates, *self._set(effects)), amounts, charged(charges, self.cell_of))
                 merged[key] = merged.get(key, _ZERO) + probability
         return tuple(
             Branch(p, changed, amounts, charges) for (changed, amounts, charges), p in merged.items()
@@ -123,7 +120,7 @@ class Outcomes:
 
     def _set(self, effects: Sequence[Effect]) -> Iterator[Update]:
         """Where several effects set a variable, true wins over unknown, and that over false."""
-        for variable, guards in self._guards(effects).items():
+        for variable, guards in _guards(effects, self.cell_of).items():
             cases: list[tuple[Expression, int]] = []
             for value in (TRUE, UNKNOWN, FALSE):
                 if guards[value] != NO:
@@ -131,27 +128,6 @@ class Outcomes:
                 if guards[value] == YES:
                     break
             yield Choose(self.cell_of[variable], tuple(cases))
-
-    def _guards(self, effects: Sequence[Effect]) -> dict[int, list[Expression]]:
-        """Of each relevant variable that is set: where it is set to false, to unknown, to true."""
-        found: dict[int, list[Expression]] = {}
-        for effect in effects:
-            sets = [(variable, value) for variable, value in effect.sets if variable in self.cell_of]
-            when = where_true(effect.when, self.cell_of) if effect.when is not None and sets else YES
-            for variable, value in sets if when != NO else ():
-                guards = found.setdefault(variable, [NO, NO, NO])
-                guards[value] = any_of(guards[value], when)
-        return {variable: found[variable] for variable in sorted(found)}
-
-    def _charges(self, charges: Iterable[Charge]) -> tuple[Charged, ...]:
-        """What the charges add, by condition."""
-        found: dict[Expression, _Amounts] = {}
-        for charge in charges:
-            when = where_true(charge.when, self.cell_of)
-            _, cost, reward = found.get(when, (_ZERO, _ZERO, _ZERO))
-            if when != NO:
-                found[when] = (_ZERO, cost + charge.cost, reward + charge.reward)
-        return tuple(Charged(when, amounts) for when, amounts in found.items())
 
     # --- in stages ----------------------------------------------------------------------------
 
@@ -167,9 +143,9 @@ class Outcomes:
         for outcome in factor.outcomes:
             if outcome.probability:
                 then = put(self.stage, self._series(outcome.factors, after))
-                updates = (*self._note(outcome), then)
+                updates = (*noted(outcome.effects, self.cell_of, self._pending), then)
                 amounts = (_ZERO, outcome.cost, outcome.reward)
-                charges = self._charges(outcome.charges)
+                charges = charged(outcome.charges, self.cell_of)
                 branches.append(Branch(outcome.probability, updates, amounts, charges))
         self._stages += 1
         own = self._stages
@@ -178,33 +154,66 @@ class Outcomes:
         )
         return own
 
-    def _note(self, outcome: Outcome) -> Iterator[Update]:
-        for variable, guards in self._guards(outcome.effects).items():
-            pending = self._pending[variable]
-            cases = [
-                (all_of(guards[value], Compare(pending, "<", value + 1)), value + 1)
-                for value in (TRUE, UNKNOWN, FALSE)
-                if guards[value] != NO
-            ]
-            yield Choose(pending, tuple(cases))
+
+def noted(
+    effects: Sequence[Effect], cell_of: Mapping[int, int], pending: Mapping[int, int]
+) -> Iterator[Update]:
+    """Notes in *pending* cells what effects set, where nothing greater is noted."""
+    for variable, guards in _guards(effects, cell_of).items():
+        note = pending[variable]
+        cases = [
+            (all_of(guards[value], Compare(note, "<", value + 1)), value + 1)
+            for value in (TRUE, UNKNOWN, FALSE)
+            if guards[value] != NO
+        ]
+        yield Choose(note, tuple(cases))
 
 
-def _combinations(factors: Sequence[Factor]) -> int:
+def applied(cell: int, pending: int) -> Choose:
+    """The cell gets what is noted for it."""
+    return Choose(cell, tuple((Compare(pending, "=", value + 1), value) for value in (FALSE, UNKNOWN, TRUE)))
+
+
+def charged(charges: Iterable[Charge], cell_of: Mapping[int, int]) -> tuple[Charged, ...]:
+    """What the charges add, by condition."""
+    found: dict[Expression, _Amounts] = {}
+    for charge in charges:
+        when = where_true(charge.when, cell_of)
+        _, cost, reward = found.get(when, (_ZERO, _ZERO, _ZERO))
+        if when != NO:
+            found[when] = (_ZERO, cost + charge.cost, reward + charge.reward)
+    return tuple(Charged(when, amounts) for when, amounts in found.items())
+
+
+def _guards(effects: Sequence[Effect], cell_of: Mapping[int, int]) -> dict[int, list[Expression]]:
+    """Of each variable with a cell that is set: where it is set to false, to unknown, to true."""
+    found: dict[int, list[Expression]] = {}
+    for effect in effects:
+        sets = [(variable, value) for variable, value in effect.sets if variable in cell_of]
+        when = where_true(effect.when, cell_of) if effect.when is not None and sets else YES
+        for variable, value in sets if when != NO else ():
+            guards = found.setdefault(variable, [NO, NO, NO])
+            guards[value] = any_of(guards[value], when)
+    return {variable: found[variable] for variable in sorted(found)}
+
+
+def combinations(factors: Sequence[Factor]) -> int:
+    """How many combinations of outcomes the factors have."""
     product = 1
     for factor in factors:
-        product *= sum(_combinations(outcome.factors) for outcome in factor.outcomes)
+        product *= sum(combinations(outcome.factors) for outcome in factor.outcomes)
     return product
 
 
-def _draws(factors: Sequence[Factor]) -> Iterator[_Drawn]:
+def draws(factors: Sequence[Factor]) -> Iterator[Drawn]:
     """Every combination of outcomes: probability, effects, charges, cost, reward."""
     if not factors:
         yield _ONE, (), (), _ZERO, _ZERO
         return
     *before, last = factors
-    for p, effects, charges, cost, reward in _draws(before):
+    for p, effects, charges, cost, reward in draws(before):
         for outcome in last.outcomes:
-            for p2, effects2, charges2, cost2, reward2 in _draws(outcome.factors):
+            for p2, effects2, charges2, cost2, reward2 in draws(outcome.factors):
                 yield (
                     p * outcome.probability * p2,
                     (*effects, *outcome.effects, *effects2),

@@ -73,6 +73,11 @@ class _Writer:
         yield from (f"// {line}" for line in preamble)
         yield program.kind
         yield ""
+        if program.kind == "pomdp":
+            yield "observables"
+            yield f"  {', '.join(names.cells[cell] for cell in program.observables)}"
+            yield "endobservables"
+            yield ""
         for name, formula in zip(names.formulas, program.formulas, strict=True):
             yield f"formula {name} = {self.expression(formula.expression)};"
         if program.formulas:

@@ -2,8 +2,9 @@
 
 A program has *cells* (bounded integer variables), *commands* (guard, and a distribution over updates
 of the cells) and *labels* (sets of states). In a Markov chain one command is enabled in every state,
-in a decision process a policy picks one of those enabled. All right-hand sides read the state before
-the update. Source: Kwiatkowska, Norman, Parker, "PRISM 4.0" (2011), reactive modules.
+in a decision process a policy picks one of those enabled, which may see a part of the cells only. All
+right-hand sides read the state before the update. Source: Kwiatkowska, Norman, Parker, "PRISM 4.0" (2011),
+reactive modules.
 """
 
 from __future__ import annotations
@@ -146,7 +147,9 @@ def parts_of(expression: Expression) -> tuple[Expression, ...]:
 
 # --- programs --------------------------------------------------------------------------------
 
-CellKind: TypeAlias = Literal["variable", "done", "attempts", "pending", "control"]
+CellKind: TypeAlias = Literal[
+    "variable", "fact", "possible", "told", "done", "attempts", "pending", "control"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,13 +262,14 @@ REWARDS = ("actions", "cost", "reward")
 """What a program counts, in the order of :attr:`Branch.rewards`: actions started, their cost, and the
 task's reward."""
 
-Kind: TypeAlias = Literal["dtmc", "mdp"]
+Kind: TypeAlias = Literal["dtmc", "mdp", "pomdp"]
 
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A Markov chain (dtmc) or decision process (mdp). ``labels`` name sets of states; the one
-    called ``finished``, in a chain, holds those that are never left."""
+    """A Markov chain (dtmc) or decision process (mdp, or pomdp: a policy sees the cells that are
+    ``observables``). ``labels`` name sets of states; the one called ``finished``, in a chain, holds those
+    that are never left."""
 
     kind: Kind
     title: str
@@ -273,6 +277,7 @@ class Program:
     formulas: tuple[Formula, ...]
     commands: tuple[Command, ...]
     labels: tuple[tuple[str, Expression], ...]
+    observables: tuple[int, ...] = ()
 
     def label(self, name: str) -> Expression:
         """The expression of a label. Raises ``KeyError``."""

@@ -14,17 +14,30 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import islice, product
-from math import gcd, lcm
 from typing import NamedTuple, TypeAlias
 
 from typing_extensions import assert_never
 
 from bbtc.ground.condition import FALSE, TRUE, Condition, Is, Known, evaluate, replaced, variables
-from bbtc.ground.task import Change, Component, Factor, Observation, Task
+from bbtc.ground.task import Change, Component, Factor, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 from bbtc.verifier.explore import Space, Step
+from bbtc.verifier.happenings import (
+    Amounts,
+    Outcome,
+    Possible,
+    Shown,
+    add,
+    holds,
+    is_weighed,
+    known_of,
+    outcomes_of_change,
+    possible_worlds,
+    prior_worlds,
+    together,
+)
 from bbtc.verifier.program import YES, Command
 
 MOST_STATES = 50_000
@@ -36,14 +49,7 @@ _ENDS = {Truth.TRUE: "success", Truth.FALSE: "failure", Truth.UNKNOWN: "blocked"
 _STEP = Command(None, YES, (), "")
 
 _Values: TypeAlias = tuple[int, ...]
-_Amounts: TypeAlias = tuple[Fraction, Fraction]  # cost, reward
-_Happens: TypeAlias = tuple[Fraction, dict[int, int], _Amounts]
-_Possible: TypeAlias = tuple[tuple[int, int], ...]
-"""The worlds that the robot holds possible, in order, with weights: 1 where these play no part."""
 _Prior: TypeAlias = Sequence[tuple[int, Fraction]]
-_Readings: TypeAlias = tuple[bool | None, ...]
-_Told: TypeAlias = tuple[tuple[int, ...], _Readings]
-"""The values of the seen variables, and what each observation told (None: it was not made)."""
 
 
 class _State(NamedTuple):
@@ -53,7 +59,7 @@ class _State(NamedTuple):
 
     values: _Values
     worlds: tuple[int | None, ...]
-    possible: tuple[_Possible, ...]
+    possible: tuple[Possible, ...]
     memory: tuple[tuple[str, int], ...]
 
 
@@ -146,15 +152,15 @@ class _Runs:
     def __init__(self, task: Task, root: Node, priors: Sequence[_Prior]) -> None:
         self._task = task
         self._priors = priors
-        self._weighed = [any(each.at_least < 1 for each in c.known) for c in task.components]
+        self._weighed = [is_weighed(component) for component in task.components]
         self._root = root
         self._around: dict[str, tuple[ControlNode, ...]] = {}
         self._below: dict[str, frozenset[str]] = {}
         self._until: set[str] = set()
         self._note(root, ())
-        self._kernels: dict[tuple[int, int, _Values], list[_Outcome]] = {}
+        self._kernels: dict[tuple[int, int, _Values], list[Outcome]] = {}
         self._kept: list[Change] = []
-        self._knows: dict[tuple[int, _Possible], list[tuple[int, int]]] = {}
+        self._knows: dict[tuple[int, Possible], list[tuple[int, int]]] = {}
         self._by_variable = {each.variable: (number, each.condition)
                              for number, component in enumerate(task.components)
                              for each in component.known}  # fmt: skip
@@ -184,10 +190,9 @@ class _Runs:
     def start(self) -> Iterator[tuple[Fraction, _State]]:
         """The first states, once the robot was told what it is told at first."""
         task = self._task
-        priors = []
-        for prior, weighed in zip(self._priors, self._weighed, strict=True):
-            scale = lcm(*(p.denominator for _, p in prior)) if weighed else 1
-            priors.append(tuple((w, int(p * scale) if weighed else 1) for w, p in sorted(prior)))
+        priors = [
+            prior_worlds(prior, weighed) for prior, weighed in zip(self._priors, self._weighed, strict=True)
+        ]
         at_first = [number for number, component in enumerate(task.components) if component.first]
         for initial in task.initial:
             if not initial.probability:
@@ -221,20 +226,10 @@ class _Runs:
         for number, possible in enumerate(state.possible):
             key = number, possible
             if key not in self._knows:
-                self._knows[key] = list(self._known(self._task.components[number], possible))
+                self._knows[key] = known_of(self._task.components[number], possible)
             for variable, value in self._knows[key]:
                 values[variable] = value
         return values
-
-    @staticmethod
-    def _known(component: Component, possible: _Possible) -> Iterator[tuple[int, int]]:
-        total = sum(weight for _, weight in possible)
-        for each in component.known:
-            true = sum(weight for world, weight in possible if _holds(component, each.condition, world))
-            if true >= each.at_least * total:
-                yield each.variable, 2
-            else:
-                yield each.variable, 0 if total - true >= each.at_least * total else 1
 
     def goal_is_true(self, state: _State) -> bool:
         """Is the goal true in the world? What it asks of knowledge is asked of the robot's."""
@@ -243,7 +238,7 @@ class _Runs:
         for variable, (number, condition) in self._by_variable.items():
             world = state.worlds[number]
             if world is not None:
-                values[variable] = 2 * _holds(self._task.components[number], condition, world)
+                values[variable] = 2 * holds(self._task.components[number], condition, world)
         return evaluate(_settled(self._task.goal, known), values) is Truth.TRUE
 
     # --- ticks -------------------------------------------------------------------------------
@@ -311,7 +306,7 @@ class _Runs:
 
     # --- actions -----------------------------------------------------------------------------
 
-    def after(self, state: _State, node: ActionNode) -> Iterator[tuple[Fraction, _State, _Amounts]]:
+    def after(self, state: _State, node: ActionNode) -> Iterator[tuple[Fraction, _State, Amounts]]:
         """What may come of an action."""
         action = self._task.action_by_name[node.action]
         for p, after, (cost, reward) in self._changed(state, action.factors, action.changes):
@@ -319,10 +314,10 @@ class _Runs:
 
     def _changed(
         self, state: _State, factors: Sequence[Factor], changes: Sequence[Change]
-    ) -> Iterator[tuple[Fraction, _State, _Amounts]]:
+    ) -> Iterator[tuple[Fraction, _State, Amounts]]:
         """What factors and changes make of a state; they happen independently."""
         known = self.known(state)
-        visible = _together(factors, known)
+        visible = together(factors, known)
         hidden = list(product(*(self._happenings(state, change, known) for change in changes)))
         for (p, sets, amounts), happening in product(visible, hidden):
             set_to, worlds, possible = dict(sets), list(state.worlds), list(state.possible)
@@ -331,7 +326,7 @@ class _Runs:
                 probability *= each.probability
                 cost, reward = cost + each.amounts[0], reward + each.amounts[1]
                 worlds[change.component], possible[change.component] = each.world, each.possible
-                _add(set_to, each.sets)
+                add(set_to, each.sets)
             values = list(state.values)
             for variable, value in set_to.items():
                 values[variable] = value
@@ -344,126 +339,40 @@ class _Runs:
         seen = tuple(known[variable] for variable in change.seen)
         world, possible = state.worlds[change.component], state.possible[change.component]
         assert world is not None
-        after: dict[_Told, dict[int, Fraction]] = {}
+        after: dict[Shown, dict[int, Fraction]] = {}
         for other, weight in possible:
             for each in self._kernel(change, other, seen):
                 mass = after.setdefault(each.told, {})
                 mass[each.world] = mass.get(each.world, _ZERO) + weight * each.probability
         weighed = self._weighed[change.component]
-        left = {told: _possible(mass, weighed) for told, mass in after.items()}
+        left = {told: possible_worlds(mass, weighed) for told, mass in after.items()}
         found: dict[_Happening, Fraction] = {}
         for each in self._kernel(change, world, seen):
             key = _Happening(each.world, left[each.told], each.told, each.sets, each.amounts)
             found[key] = found.get(key, _ZERO) + each.probability
         return [each._replace(probability=p) for each, p in found.items()]
 
-    def _kernel(self, change: Change, world: int, seen: _Values) -> list[_Outcome]:
+    def _kernel(self, change: Change, world: int, seen: _Values) -> list[Outcome]:
         """All that a change may do in a world, and what the robot is told of it."""
         key = id(change), world, seen
         found = self._kernels.get(key)
         if found is None:
             self._kept.append(change)  # so that its id stays its own
-            found = self._kernels[key] = list(self._outcomes(change, world, seen))
+            found = self._kernels[key] = list(
+                outcomes_of_change(self._task.components[change.component], change, world, seen)
+            )
         return found
-
-    def _outcomes(self, change: Change, world: int, seen: _Values) -> Iterator[_Outcome]:
-        component = self._task.components[change.component]
-        facts = len(component.facts)
-        before = [*_local(component, world), *seen]
-        for p, sets, amounts in _together(change.factors, before):
-            values = list(before)
-            for local, value in sets.items():
-                values[local] = value
-            after = sum(1 << bit for bit in range(facts) if values[bit] == Truth.TRUE)
-            visible = tuple((change.seen[k - facts], v) for k, v in sorted(sets.items()) if k >= facts)
-            for q, told in _readings(change.observations, values):
-                yield _Outcome(after, (tuple(values[facts:]), told), p * q, visible, amounts)
-
-
-class _Outcome(NamedTuple):
-    """One of the things that a change may do in a world."""
-
-    world: int
-    told: _Told
-    probability: Fraction
-    sets: tuple[tuple[int, int], ...]
-    amounts: _Amounts
 
 
 class _Happening(NamedTuple):
     """The same, with the worlds that are possible for the robot after it."""
 
     world: int
-    possible: _Possible
-    told: _Told
+    possible: Possible
+    told: Shown
     sets: tuple[tuple[int, int], ...]
-    amounts: _Amounts
+    amounts: Amounts
     probability: Fraction = _ZERO
-
-
-def _possible(mass: dict[int, Fraction], weighed: bool) -> _Possible:
-    if not weighed:
-        return tuple((world, 1) for world, weight in sorted(mass.items()) if weight)
-    scale = lcm(*(weight.denominator for weight in mass.values()))
-    whole = {world: int(weight * scale) for world, weight in sorted(mass.items()) if weight}
-    common = gcd(*whole.values())
-    return tuple((world, weight // common) for world, weight in whole.items())
-
-
-def _local(component: Component, world: int) -> list[int]:
-    return [2 * (world >> bit & 1) for bit in range(len(component.facts))]
-
-
-def _holds(component: Component, condition: Condition, world: int) -> bool:
-    return evaluate(condition, _local(component, world)) is Truth.TRUE
-
-
-def _readings(observations: Sequence[Observation], values: Sequence[int]) -> list[tuple[Fraction, _Readings]]:
-    """What observations may tell where the local variables have these values."""
-    found: list[tuple[Fraction, _Readings]] = [(_ONE, ())]
-    for each in observations:
-        if each.when is not None and evaluate(each.when, values) is not Truth.TRUE:
-            tells: list[tuple[Fraction, bool | None]] = [(_ONE, None)]
-        else:
-            true = evaluate(each.condition, values) is Truth.TRUE
-            tells = [(each.accuracy, true), (1 - each.accuracy, not true)]
-        found = [(p * q, (*told, tell)) for p, told in found for q, tell in tells if q]
-    return found
-
-
-def _together(factors: Sequence[Factor], values: Sequence[int]) -> list[_Happens]:
-    """What independent factors may do: what is set, where of several values the greatest stays, and what is
-    added to cost and reward."""
-    found: list[_Happens] = [(_ONE, {}, (_ZERO, _ZERO))]
-    for factor in factors:
-        drawn: list[_Happens] = []
-        for outcome in factor.outcomes:
-            if not outcome.probability:
-                continue
-            sets: dict[int, int] = {}
-            for effect in outcome.effects:
-                if effect.when is None or evaluate(effect.when, values) is Truth.TRUE:
-                    _add(sets, effect.sets)
-            due = [each for each in outcome.charges if evaluate(each.when, values) is Truth.TRUE]
-            cost = sum((each.cost for each in due), outcome.cost)
-            reward = sum((each.reward for each in due), outcome.reward)
-            for p, inner, (more_cost, more_reward) in _together(outcome.factors, values):
-                both = dict(sets)
-                _add(both, inner.items())
-                drawn.append((outcome.probability * p, both, (cost + more_cost, reward + more_reward)))
-        combined = []
-        for p, one, (cost, reward) in found:
-            for q, other, (more_cost, more_reward) in drawn:
-                both = dict(one)
-                _add(both, other.items())
-                combined.append((p * q, both, (cost + more_cost, reward + more_reward)))
-        found = combined
-    return found
-
-
-def _add(sets: dict[int, int], more: Iterable[tuple[int, int]]) -> None:
-    for variable, value in more:
-        sets[variable] = max(int(value), sets.get(variable, 0))
 
 
 def _settled(goal: Condition, known: Sequence[int]) -> Condition:

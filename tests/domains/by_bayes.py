@@ -99,7 +99,9 @@ def _readings(observations: Sequence[Observation], values: Values) -> Iterator[t
             ways.append([(Fraction(1), None)])
             continue
         truth = value_of(each.condition, values) == "T"
-        noisy = [(each.accuracy, truth), (1 - each.accuracy, not truth)]
+        otherwise = each.accuracy if each.accuracy_false is None else each.accuracy_false
+        right = each.accuracy if truth else otherwise
+        noisy = [(right, truth), (1 - right, not truth)]
         ways.append([(chance, said) for chance, said in noisy if chance])
     for way in product(*ways):
         yield _all(chance for chance, _ in way), tuple(said for _, said in way)

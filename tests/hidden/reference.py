@@ -226,19 +226,20 @@ class HiddenText(Lifted):
 
     # --- what is told --------------------------------------------------------------------
 
-    def told(self, name: str) -> list[tuple[Form, Fraction]]:
-        """What an action tells, and how probably it is right."""
+    def told(self, name: str) -> list[tuple[Form, tuple[Fraction, Fraction]]]:
+        """What an action tells, and how probably it is right where that is true, and where it is false."""
         schema = name.partition("(")[0]
         (observed,) = (each.get(":observe", ["and"]) for each in self.actions if each[":name"] == schema)
         if observed[0] == "probabilistic":
-            return [(observed[2], Fraction(observed[1]))]
-        return [(part, _ONE) for part in _parts(observed)]
+            return [(observed[2], (Fraction(observed[1]), Fraction(observed[3 if len(observed) > 3 else 1])))]
+        return [(part, (_ONE, _ONE)) for part in _parts(observed)]
 
     def readings(self, name: str, bound: Mapping[str, str], world: World) -> dict[tuple[bool, ...], Fraction]:
         """What may be told in a world."""
         found: dict[tuple[bool, ...], Fraction] = {(): _ONE}
-        for form, right in self.told(name):
+        for form, rights in self.told(name):
             true = self.value(form, bound, dict.fromkeys(world, 2)) == 2
+            right = rights[0 if true else 1]
             both = [(true, right), (not true, 1 - right)]
             found = {(*so_far, each): p * q for so_far, p in found.items() for each, q in both if q}
         return found

@@ -35,6 +35,9 @@ def test_what_cannot_be_read_is_refused_by_name(form: str, named: str) -> None:
     (error,) = caught.value.diagnostics
     assert error.code == "BBT0212"
     assert named in error.message
+    if named in {"`:percepts`", "`:observe`"}:
+        assert error.hint is not None
+        assert "DT-PDDL" in error.hint, "nothing is said of time"
 
 
 def test_a_sensor_of_k_replanner_and_its_invariants_are_read() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -45,10 +46,26 @@ def test_observations_and_failing_actions_are_those_of_our_own_language(q: str, 
     assert values(text) == values(OWN.format(q=q, prior=prior))
 
 
+@pytest.mark.parametrize(("q", "r"), [("0.9", "0.4"), ("0.6", "0.05"), ("1", "0.3"), ("0.7", "0")])
+def test_observations_may_err_more_often_one_way(q: str, r: str) -> None:
+    """``o`` is told with q where it is heads, and with r where it is not."""
+    sensor = f"""(:observation yes :condition (heads) :distribution (probabilistic {q} (o)))
+      (:observation no :condition (not (heads)) :distribution (probabilistic {r} (o)))"""
+    own = OWN.replace(
+        "(probabilistic {q} (heads))", f"(probabilistic {q} (heads) {1 - Fraction(r)} (not (heads)))"
+    )
+    found = values(COIN.format(sensor=sensor, true="", belief="(prob (heads) 0.3)"))
+    assert found == values(own.format(prior="0.3"))
+    assert found[1] > found[0]
+
+
 @pytest.mark.parametrize("true", ["", "(heads)", "(called)"])
 def test_what_is_true_never_touches_the_prior(true: str) -> None:
     text = COIN.format(sensor=SENSOR.format(q="0.8", r="0.2"), true=true, belief="(prob (heads) 0.5)")
-    assert task_of(text) == task_of(text.replace(f"(:init {true})", "(:init)"))
+    tasks = [
+        replace(task_of(each), true_worlds=()) for each in (text, text.replace(f"(:init {true})", "(:init)"))
+    ]
+    assert tasks[0] == tasks[1]
 
 
 def test_joint_beliefs_are_drawn_together() -> None:
@@ -102,7 +119,10 @@ def test_who_fails_pays_all_the_same() -> None:
     [
         (SENSOR.format(q="0.8", r="0.3"), "", "BBT0211"),
         ("(:observation yes :condition (heads) :distribution (probabilistic 0.8 (o)))", "", None),
-        (SENSOR.format(q="0.8", r="0.2").replace("(probabilistic 0.2", "(probabilistic 0.1"), "", "BBT0421"),
+        (SENSOR.format(q="0.8", r="0.2").replace("(probabilistic 0.2", "(probabilistic 0.1"), "", None),
+        (SENSOR.format(q="0.8", r="0.2") + """
+          (:observation odd :condition (and (heads) (called)) :distribution (probabilistic 0.5 (o)))""",
+         "", "BBT0421"),
         ("(:observation y :distribution (probabilistic 0.8 (o) 0.2 (won)))", "", "BBT0421"),
         ("(:observation y :distribution (probabilistic 0.8 (and (o) (won))))", "", "BBT0421"),
         ("(:observation y :condition (known (heads)) :distribution (o))", "", "BBT0406"),

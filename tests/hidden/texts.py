@@ -18,7 +18,7 @@ def _literal(atoms: tuple[str, ...]) -> st.SearchStrategy[str]:
 
 
 @functools.cache
-def _condition(atoms: tuple[str, ...]) -> st.SearchStrategy[str]:
+def conditions(atoms: tuple[str, ...]) -> st.SearchStrategy[str]:
     literal = _literal(atoms)
     several = st.lists(literal, min_size=2, max_size=2)
     joined = st.builds(
@@ -32,7 +32,7 @@ def _condition(atoms: tuple[str, ...]) -> st.SearchStrategy[str]:
 @st.composite
 def _needs(draw: st.DrawFn, atoms: tuple[str, ...]) -> str:
     """A precondition: now and then it asks what is known."""
-    found = draw(_condition(atoms))
+    found = draw(conditions(atoms))
     if draw(st.integers(0, 5)):
         return found
     return f"(and ({draw(st.sampled_from(['known', 'unknown']))} ({draw(st.sampled_from(HIDDEN))})) {found})"
@@ -49,7 +49,7 @@ def _effect(draw: st.DrawFn) -> str:
         if kind == 3 and not draw(st.integers(0, 2)):
             target = f"(unknown ({draw(st.sampled_from(HIDDEN))}))"
         elif kind == 0:
-            target = f"(when {draw(_condition(ATOMS))} {target})"
+            target = f"(when {draw(conditions(ATOMS))} {target})"
         elif kind == 1:
             target = f"(probabilistic 1/3 {target})"
         elif kind == 2:
@@ -65,7 +65,7 @@ def _is_clause(condition: str) -> bool:
 
 @functools.cache
 def _clause() -> st.SearchStrategy[str]:
-    return _condition(("i", "j")).filter(_is_clause)
+    return conditions(("i", "j")).filter(_is_clause)
 
 
 @st.composite
@@ -79,9 +79,11 @@ def texts(draw: st.DrawFn, *, noise: bool = False) -> str:
             form += f" :precondition {draw(_needs(ATOMS))}"
         kind = draw(st.integers(0, 3))
         if kind < 3:
-            told = draw(_condition(HIDDEN)) if draw(st.booleans()) else f"({draw(st.sampled_from(ATOMS))})"
+            told = draw(conditions(HIDDEN)) if draw(st.booleans()) else f"({draw(st.sampled_from(ATOMS))})"
             if noise and draw(st.booleans()):
-                told = f"(probabilistic 3/4 ({draw(st.sampled_from(HIDDEN))}))"
+                fact = draw(st.sampled_from(HIDDEN))
+                other = draw(st.sampled_from(["", "", f" 1/2 (not ({fact}))", f" 1 (not ({fact}))"]))
+                told = f"(probabilistic 3/4 ({fact}){other})"
             form += f" :observe {told}"
         if kind in {0, 3}:
             form += f" :effect {draw(_effect())}"

@@ -110,7 +110,11 @@ def git(folder: Path, *arguments: str) -> str:
 # installs bbtc alone, and finds here what bbtc needs, and what builds it.
 INSTALL = {"PIP_NO_COMPILE": "1"}
 if not LONG:
-    here = {"PYTHONPATH": sysconfig.get_path("purelib"), "PIP_NO_DEPS": "1", "PIP_NO_BUILD_ISOLATION": "false"}
+    here = {
+        "PYTHONPATH": sysconfig.get_path("purelib"),
+        "PIP_NO_DEPS": "1",
+        "PIP_NO_BUILD_ISOLATION": "false",
+    }
     INSTALL |= here | {"PIP_NO_INDEX": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
 
 

@@ -19,11 +19,11 @@ from bbtc.ground.condition import FALSE, Is, Or
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.pipeline import verify_tree
 from bbtc.planner.bounds import task_value
 from bbtc.planner.guard import guarded
 from bbtc.planner.recovering import recovering_tree
 from bbtc.tree.nodes import ActionNode, ControlNode, Node
-from bbtc.verifier.verdict import verify
 from tests.disturbance.reference import Exact, best_next, reachable
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.long_form import amount
@@ -74,14 +74,14 @@ def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
 @pytest.mark.parametrize("problem", PROBLEMS, ids=str)
 def test_trees_of_our_domains_recover(problem: Problem) -> None:
     of = task_of(problem)
-    if of.components:
-        pytest.skip("facts are hidden: nothing tells what the robot believes in other states (BBT0506)")
+    if of.endless_beliefs:
+        pytest.skip("there is no end to what may be believed")
     if problem.domain in LARGE and problem.name != "after-the-alarm":
         pytest.skip("too many states for each")
     done = plan(of, "auto")
     found = recovery(of, done.tree.root, Limits())
     assert (found.attained, found.missed) == (found.hopeful, 0)
-    assert verify(guarded(done).tree, Limits(), "own").problems == ()
+    assert verify_tree(guarded(done).tree, Limits(), "own").problems == ()
     disturbed = perturbed_runs(of, done.tree.root, Fraction(1, 10), Limits(), runs=300)
     assert (disturbed.unready, disturbed.missed) == (0, 0)
 

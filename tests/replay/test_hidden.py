@@ -187,6 +187,24 @@ def test_a_bag_in_one_of_four_rooms_is_found(name: EngineName) -> None:
         assert assert_replayed(*hand_made("wings"), make) >= 4 * len(TIMINGS)
 
 
+_BOX = """
+(define (domain box)
+  (:predicates (whole) (armed) (shaken))
+  (:action shake
+    :observe (probabilistic 3/4 (whole))
+    :effect (and (when (armed) (probabilistic 1/2 (not (whole)))) (not (armed)) (shaken))))
+(define (problem parcel) (:domain box) (:init (armed) (unknown (whole))) (:goal (and (shaken) (whole))))
+"""
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_an_action_may_end_what_decides_over_what_it_changes_unseen(name: EngineName) -> None:
+    pair = planned(compiled(_BOX), Fraction(1, 5))
+    assert pair is not None
+    with engine(name) as (_, make):
+        assert assert_replayed(*pair, make) > 0
+
+
 HIDDEN = {"corridors", "diagnosis", "press", "shelves"}
 
 

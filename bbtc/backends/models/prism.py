@@ -10,10 +10,12 @@ from typing_extensions import assert_never
 from bbtc.backends.exporter import Figures, Option, OptionValue
 from bbtc.backends.names import Namer, snake
 from bbtc.ground.task import Task
+from bbtc.limits import Limits
 from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
 from bbtc.verifier.chain import MOST_WRITTEN, Form, chain_of
 from bbtc.verifier.naming import Names
+from bbtc.verifier.partial import partial_process_of
 from bbtc.verifier.prism import END, KEYWORDS, counted, prism_text
 from bbtc.verifier.process import process_of
 from bbtc.verifier.program import REWARDS, Cell, Formula, Program
@@ -59,6 +61,12 @@ def task_text(task: Task) -> str:
     return _text(process_of(task))
 
 
+def partial_task_text(task: Task, limits: Limits) -> str:
+    """The partially observable decision process of a task: what any policy could do that sees what the robot
+    sees. Raises as :func:`partial_process_of` does."""
+    return _text(partial_process_of(task, limits))
+
+
 def _text(program: Program) -> str:
     return prism_text(program, readable_names(program), tuple(_preamble(program)))
 
@@ -66,7 +74,7 @@ def _text(program: Program) -> str:
 def _preamble(program: Program) -> Iterator[str]:
     what = "a tree and its task" if program.kind == "dtmc" else "a task"
     yield f"{printable(program.title)}: {what}. Values of variables: 0 false, 1 unknown, 2 true."
-    if program.kind == "mdp":
+    if program.kind != "dtmc":
         yield 'The best that any policy can do: Pmax=? [F "goal"]'
         return
     asked = [f'P=? [F "{end}"]' for end in ("success", "failure", "blocked")]
@@ -102,8 +110,10 @@ def _cell(cell: Cell) -> str:
     match cell.kind:
         case "variable" | "control":
             return snake(cell.subject)
-        case "done" | "attempts":
+        case "done" | "attempts" | "possible" | "told":
             return f"{cell.kind}_{snake(cell.subject)}"
+        case "fact":
+            return f"really_{snake(cell.subject)}"
         case "pending":
             return f"next_{snake(cell.subject)}"
         case _:

@@ -68,15 +68,15 @@ class DiagramBeliefs(Beliefs):
         return found
 
     def _known_in(self, node: int) -> Iterator[tuple[int, int]]:
-        true = self._diagrams.true_weights(node)
-        total = self._diagrams.total(Weighted(1, node))
+        sure = self._diagrams.sure(node)
         for each in self.component.known:
             match each.condition:
-                case Is(place, Truth.TRUE):
-                    weight = true[place]
+                case Is(place, Truth.TRUE) if each.at_least == 1:
+                    true, false = (places >> place & 1 for places in sure)
+                    yield each.variable, int(Truth.TRUE if true else Truth.FALSE if false else Truth.UNKNOWN)
                 case condition:
-                    weight, _ = self._of.share(node, condition)
-            yield each.variable, int(believed(weight, total, each.at_least))
+                    weight, total = self._of.share(node, condition)
+                    yield each.variable, int(believed(weight, total, each.at_least))
 
     def _chance(self, number: int, condition: Condition) -> Fraction:
         return Fraction(*self._of.share(self._nodes[number], condition))
@@ -164,7 +164,8 @@ class DiagramBeliefs(Beliefs):
     ) -> tuple[dict[_Piece, Weighted], int]:
         """What an observation tells of each piece, and the factor of all weights."""
         observation, diagrams = kernel.change.observations[at], self._diagrams
-        right, scale = observation.accuracy.numerator, observation.accuracy.denominator
+        scale = lcm(*(observation.right(true).denominator for true in (True, False)))
+        right = [int(observation.right(true) * scale) for true in (False, True)]
         found: dict[_Piece, Weighted] = {}
 
         def add(piece: _Piece, told: Told, factor: int, mass: Weighted) -> None:
@@ -181,8 +182,8 @@ class DiagramBeliefs(Beliefs):
             if asked.weight:
                 for value, node in ((1, true), (0, diagrams.complement(true))):
                     part = diagrams.times(asked, node)
-                    add(piece, ((~at, value),), right, part)
-                    add(piece, ((~at, 1 - value),), scale - right, part)
+                    add(piece, ((~at, value),), right[value], part)
+                    add(piece, ((~at, 1 - value),), scale - right[value], part)
         return found, scale
 
     def _seen_after(self, told: Told, seen: bytes) -> bytes:

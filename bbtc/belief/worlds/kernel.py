@@ -160,13 +160,13 @@ def compile_observation(observation: Observation) -> Callable[[bytes], list[tupl
     """What an observation may tell, with probabilities; nothing where it is not made."""
     truth = compile_condition(observation.condition)
     when = compile_condition(TRUE if observation.when is None else observation.when)
-    right, wrong = observation.accuracy, 1 - observation.accuracy
 
     def readings(values: bytes) -> list[tuple[int, Fraction]]:
         if when(values) != Truth.TRUE:
             return []
         true = truth(values) == Truth.TRUE
-        both = [(int(true), right), (int(not true), wrong)]
+        right = observation.right(true)
+        both = [(int(true), right), (int(not true), 1 - right)]
         return [(value, p) for value, p in both if p]
 
     return readings

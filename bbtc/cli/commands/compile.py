@@ -12,11 +12,11 @@ from bbtc.cli.session import command as session_command
 @click.argument("files", nargs=-1, required=True, metavar="DOMAIN [PROBLEM]")
 @click.option(
     "--emit",
-    type=click.Choice(["ast", "model", "ground", "prism", "jani"]),
+    type=click.Choice(["ast", "model", "ground", "prism", "prism-pomdp", "jani"]),
     default="ground",
     show_default=True,
     help="What to write: the syntax trees, the resolved model, the ground task, or the task as a Markov "
-    "decision process for model checkers.",
+    "decision process for model checkers (prism-pomdp: partially observable, where facts are hidden).",
 )
 @problem_options
 @grounding_limits
@@ -36,7 +36,7 @@ def command(
 
     session.expect_output(output, files, check=check, depfile=depfile)
     sources = [session.read(file) for file in files]
-    if emit in {"ground", "prism", "jani"}:
+    if emit in {"ground", "prism", "prism-pomdp", "jani"}:
         reading = session.reading
         task = pipeline.compile_sources(sources, session.report, session.limits, reading, checks=True)
         if emit == "ground":
@@ -44,7 +44,7 @@ def command(
 
             text = dumps(task_to_json(task))
         else:
-            text = pipeline.process_text(task, emit)
+            text = pipeline.process_text(task, emit, session.limits)
         session.say(
             f"{task.domain}/{task.problem}: {len(task.variables)} variables, {len(task.actions)} actions, "
             f"{len(task.templates)} templates"

@@ -13,7 +13,9 @@ from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, compile_condition, variables
 from bbtc.ground.condition_diagram import diagrams_of
 from bbtc.ground.hidden.changes import Local, act, divided, join, read_after, telling
+from bbtc.ground.hidden.derived_tests import with_asked
 from bbtc.ground.hidden.failing import may_fail
+from bbtc.ground.hidden.given import contradicts
 from bbtc.ground.hidden.groups import Groups
 from bbtc.ground.hidden.knowledge import KnownConditions, TooManyCases
 from bbtc.ground.hidden.naming import formula_names
@@ -37,10 +39,11 @@ _MOST_NAMED = 4
 def hidden_task(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """The task of a model with hidden state. Raises as :func:`bbtc.ground.instantiate.ground` does."""
     with collector_paused():
+        model, asked = with_asked(model)
         found = physical(model, report, limits)
         if model.may_fail:
             found = may_fail(found)
-        return _Compiler(model, found, report, limits).task()
+        return _Compiler(model, asked, found, report, limits).task()
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +56,16 @@ class _Read:
 
 
 class _Compiler:
-    def __init__(self, model: md.Model, found: Physical, report: Report, limits: Limits) -> None:
+    def __init__(
+        self, model: md.Model, asked: frozenset[str], found: Physical, report: Report, limits: Limits
+    ) -> None:
         self._model = model
+        self._tests = {
+            number: condition
+            for number, (condition, _) in found.thresholds.items()
+            if found.task.variables[number].predicate in asked
+        }
+        """By variable that stands for a derived fact whose knowledge is asked for: what that is."""
         self._found = found
         self._report = report
         self._limits = limits
@@ -105,7 +116,7 @@ class _Compiler:
     def _asked_beliefs(self) -> Iterator[tuple[int, tuple[Condition, Fraction]]]:
         """The thresholds that matter. What they ask has to be hidden."""
         for number, (condition, at_least) in self._found.thresholds.items():
-            if number not in self._kept:
+            if number not in self._kept or number in self._tests:
                 continue
             every = self._found.task.variables
             seen = [every[each].name for each in variables(condition) if each not in self._hidden]
@@ -188,9 +199,11 @@ class _Compiler:
         for component in components:
             for variable, value in _known_at_first(component):
                 values[variable] = value
+        true_worlds = tuple(self._true_worlds(components))
         made = replace(
             made,
             components=tuple(components),
+            true_worlds=true_worlds,
             initial=(gt.InitialState(Fraction(1), tuple(values)),),
         )
         last = len(self._found.task.variables)
@@ -198,6 +211,7 @@ class _Compiler:
             number
             for number in range(len(made.variables))
             if (number in asked if number in self._hidden or number >= last else number in self._kept)
+            and number not in self._tests
         ]
         return reordered(made, sorted(order, key=lambda number: made.variables[number].name))
 
@@ -216,6 +230,25 @@ class _Compiler:
             leader = next(self._groups.of(each) for each in read_after([reading]) if each in self._groups)
             self._first_of.setdefault(leader, []).append(reading)
 
+    def _true_worlds(self, components: Iterable[gt.Component]) -> Iterator[gt.TrueWorld]:
+        """What is true in simulated runs, as far as it is hidden and matters."""
+        components = list(components)
+        hidden = {fact for component in components for fact in component.facts}
+        for said in self._model.true_worlds:
+            named = [(gt.ground_name(fact.predicate, fact.args), fact) for fact in said]
+            mine = [(name, fact) for name, fact in named if name in hidden]
+            world = gt.TrueWorld(
+                frozenset(name for name, fact in mine if fact.value is Truth.TRUE),
+                frozenset(name for name, fact in mine if fact.value is Truth.FALSE),
+            )
+            for component in components:
+                if contradicts(component, world):
+                    span = next(fact.span for name, fact in mine if name in component.facts)
+                    told = "what is said to be true at the start cannot be, by what is said to be known then"
+                    hint = "runs begin in a world that can be"
+                    self._report.warning("BBT0431", told, span, hint)
+            yield world
+
     # --- conditions --------------------------------------------------------------------------
 
     def _read(self) -> _Read:
@@ -223,7 +256,7 @@ class _Compiler:
         task = self._found.task
         while True:
             self._limits.check_time("grounding")
-            knowledge = KnownConditions(self._groups, len(task.variables))
+            knowledge = KnownConditions(self._groups, task.variables, self._tests)
             goal = self._known(knowledge, task.goal, task.goal_span)
             preconditions = [
                 self._known(knowledge, each.action.precondition, each.action.span) for each in self._acts

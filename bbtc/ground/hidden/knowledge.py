@@ -8,7 +8,7 @@ component become one formula with a variable of its own, after visible facts are
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 from typing_extensions import assert_never
@@ -25,6 +25,7 @@ from bbtc.ground.condition import (
     Or,
     conjunction,
     disjunction,
+    doubt,
     is_test,
     leaves,
     negation,
@@ -32,6 +33,7 @@ from bbtc.ground.condition import (
 )
 from bbtc.ground.hidden.groups import Groups
 from bbtc.ground.hidden.parts import facts_read
+from bbtc.ground.task import Variable
 from bbtc.kleene import Truth
 
 _MOST_CASES = 8
@@ -48,12 +50,16 @@ class KnownConditions:
     """Makes conditions on what is known. Components that one formula needs are joined in ``groups``, and
     ``joined`` tells that there were such: then all has to be made anew."""
 
-    def __init__(self, groups: Groups, first: int) -> None:
-        """``first`` is the number of the first variable of a formula."""
+    def __init__(
+        self, groups: Groups, known: Sequence[Variable], tests: Mapping[int, Condition] | None = None
+    ) -> None:
+        """Formulas get variables behind those that are ``known``. ``tests`` are variables of which conditions
+        ask whether they are known, and what they stand for."""
         self.groups = groups
         self.joined = False
         self.formulas: dict[Condition, int] = {}
-        self._first = first
+        self._variables, self._first = known, len(known)
+        self._tests = tests or {}
         self._made: dict[tuple[Condition, bool], Condition] = {}
 
     def known(self, condition: Condition, *, truth: bool) -> Condition:
@@ -67,6 +73,9 @@ class KnownConditions:
 
     def _known(self, condition: Condition, truth: bool) -> Condition:
         match condition:
+            case Is(variable) | Known(variable) if variable in self._tests:
+                unknown = doubt(self.known(self._tests[variable], truth=False), self._unknown)
+                return negation(unknown) if isinstance(condition, Known) else unknown
             case Is() | Known() | Constant():
                 return condition
             case Not(part):
@@ -79,6 +88,12 @@ class KnownConditions:
                 return self._together(parts, disjunction, truth)
             case _:
                 assert_never(condition)
+
+    def _unknown(self, variable: int) -> Condition:
+        """Where a variable of what is known, or of what is seen, is unknown."""
+        seen = variable not in self.groups and variable < self._first
+        never = seen and not self._variables[variable].three_valued
+        return FALSE if never else Is(variable, Truth.UNKNOWN)
 
     def _together(self, parts: tuple[Condition, ...], combine: _Combine, truth: bool) -> Condition:
         clusters: list[tuple[set[int], list[Condition]]] = []

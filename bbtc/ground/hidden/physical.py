@@ -9,7 +9,7 @@ from fractions import Fraction
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, TRUE, Condition, Constant, Is, Known, replaced, variables
-from bbtc.ground.hidden.repeats import Keeping, Kept
+from bbtc.ground.hidden.repeats import Keeping
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
 from bbtc.ground.normal import conjuncts, normal_form
 from bbtc.ground.reachability.atoms import Atoms
@@ -81,7 +81,7 @@ def physical(model: md.Model, report: Report, limits: Limits) -> Physical:
             besides = [_besides(builder.lowering, each, frame) for each in schema.told]
             for row in rows:
                 env = frame.env(row)
-                made = [gt.Observation(condition(env), accuracy) for condition, accuracy in told]
+                made = [replace(each, condition=condition(env)) for condition, each in told]
                 made += [observed(env) for observed in besides]
                 made = [
                     each for each in made if not isinstance(each.condition, Constant) and each.when != FALSE
@@ -143,10 +143,10 @@ def _sensed(lowering: Lowering, sensors: Iterable[md.Sensor], limits: Limits) ->
             condition = when(env)
             if condition == FALSE:
                 continue
-            for sensed, accuracy in told:
+            for sensed, each in told:
                 found = sensed(env)
                 if not isinstance(found, Constant):
-                    made = gt.Observation(found, accuracy, None if condition == TRUE else condition)
+                    made = replace(each, condition=found, when=None if condition == TRUE else condition)
                     args = universe.args(tuple(env[slot] for slot in slots))
                     yield _Reading(made, (sensor.name, args) if sensor.repeats else None)
 
@@ -158,21 +158,24 @@ def _besides(lowering: Lowering, reading: md.Reading, frame: Frame) -> Callable[
 
     def observation(env: Env) -> gt.Observation:
         guard = when(env)
-        return gt.Observation(condition(env), reading.accuracy, None if guard == TRUE else guard)
+        made = None if guard == TRUE else guard
+        return gt.Observation(condition(env), reading.accuracy, made, reading.accuracy_false)
 
     return observation
 
 
 def _told(
     lowering: Lowering, observed: mf.Formula | me.Choice, frame: Frame
-) -> list[tuple[Lowered, Fraction]]:
-    """What is told, and how likely it is right: every part of a conjunction by itself."""
+) -> list[tuple[Lowered, gt.Observation]]:
+    """What is told, every part of a conjunction by itself, and as what observation, but for the condition."""
     if not isinstance(observed, me.Choice):
-        return [(lowering.condition(normal_form(part), frame), Fraction(1)) for part in conjuncts(observed)]
+        exact = gt.Observation(TRUE)
+        return [(lowering.condition(normal_form(part), frame), exact) for part in conjuncts(observed)]
     noisy = noise(observed)
     assert noisy is not None  # others are refused
-    fact, accuracy = noisy
-    return [(lowering.condition(mf.Atom(fact.predicate, fact.args), frame), accuracy)]
+    fact, accuracy, accuracy_false = noisy
+    condition = lowering.condition(mf.Atom(fact.predicate, fact.args), frame)
+    return [(condition, gt.Observation(TRUE, accuracy, accuracy_false=accuracy_false))]
 
 
 def _numbered(
@@ -218,9 +221,10 @@ def _numbered(
         made = reading.observation
         when = None if made.when is None else replaced(made.when, leaf)
         told = replaced(made.condition, leaf)
-        if reading.source is None or made.accuracy in (0, 1):
-            return replace(made, condition=told, when=when)
-        return gt.Observation(keeping.told(Kept(told, made.accuracy, *reading.source)), when=when)
+        made = replace(made, condition=told, when=when)
+        if reading.source is None or not made.noisy:
+            return made
+        return gt.Observation(keeping.told(made, *reading.source), when=when)
 
     told_first = [observation(each) for each in sensors]
     of_sensors = _after_actions(task, told_first)

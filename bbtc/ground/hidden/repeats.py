@@ -15,13 +15,14 @@ from bbtc.kleene import Truth
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A noisy observation that is kept: what it tells, how probably it is right, and the name of the fact
-    that it is wrong."""
+    """A noisy observation that is kept: what it tells, how probably it is right where that is true, or
+    false (None: both), and the name of the fact that it is wrong."""
 
     condition: Condition
     accuracy: Fraction
     name: str
     args: tuple[str, ...]
+    where: bool | None = None
 
 
 class Keeping:
@@ -33,17 +34,30 @@ class Keeping:
         self.facts: list[tuple[gt.Variable, Kept]] = []
         self._numbers: dict[Kept, int] = {}
 
-    def told(self, kept: Kept) -> Condition:
-        """What is told exactly: the reading, be it right or wrong."""
+    def told(self, reading: gt.Observation, name: str, args: tuple[str, ...]) -> Condition:
+        """What a reading tells exactly, be it right or wrong."""
+        condition = reading.condition
+        if reading.accuracy_false is None:
+            wrong = self._wrong(Kept(condition, reading.accuracy, name, args))
+            return disjunction(
+                [conjunction([condition, negation(wrong)]), conjunction([negation(condition), wrong])]
+            )
+        missed = self._wrong(Kept(condition, reading.accuracy, name, args, where=True))
+        seen = self._wrong(Kept(condition, reading.accuracy_false, name, args, where=False))
+        return disjunction(
+            [conjunction([condition, negation(missed)]), conjunction([negation(condition), seen])]
+        )
+
+    def _wrong(self, kept: Kept) -> Condition:
+        """That it is wrong."""
         number = self._numbers.get(kept)
         if number is None:
             number = self._numbers[kept] = len(self._task.variables) + len(self.facts)
-            predicate = gt.unused_name(gt.MISREAD + kept.name, self._taken)
+            predicate = gt.unused_name(
+                gt.MISREAD + ("not " if kept.where is False else "") + kept.name, self._taken
+            )
             self.facts.append((gt.Variable(predicate, kept.args, three_valued=False), kept))
-        right, wrong = Is(number, Truth.FALSE), Is(number, Truth.TRUE)
-        return disjunction(
-            [conjunction([kept.condition, right]), conjunction([negation(kept.condition), wrong])]
-        )
+        return Is(number, Truth.TRUE)
 
     def odds(self) -> Mapping[int, Fraction]:
         """How probable it is that each reading is wrong."""

@@ -4,6 +4,7 @@ that expands only what matters."""
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import count
@@ -16,6 +17,7 @@ from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
 from bbtc.planner.mdp.fully_observable import fully_observable
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
+from bbtc.planner.mdp.pomdp.search import Search
 from bbtc.planner.mdp.pomdp.solve import closed_in, highest, search_of
 from bbtc.planner.mdp.state_space import StateSpace
 
@@ -49,6 +51,17 @@ class Best:
         return self.found.space
 
 
+class OnlyBounds(LimitReached):
+    """A limit was met before a policy was found; these ``bounds`` on P* are known all the same."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic], bounds: Bounds) -> None:
+        self.bounds = bounds
+        super().__init__(diagnostics)
+
+    def __reduce__(self) -> tuple[type[OnlyBounds], tuple[tuple[Diagnostic, ...], Bounds]]:
+        return type(self), (self.diagnostics, self.bounds)
+
+
 def best_known(
     task: Task,
     limits: Limits,
@@ -64,8 +77,8 @@ def best_known(
     asks for the whole space, if the limits allow it, so that the least cost can be told. ``advice`` is what
     a search follows first.
 
-    Raises ``LimitReached`` only if the time is over before anything was found, or with ``whole`` if
-    the limits do not allow to explore the whole space.
+    Raises ``LimitReached`` only if the time is over before anything was found (:class:`OnlyBounds` where
+    bounds are known then), or with ``whole`` if the limits do not allow to explore the whole space.
     """
     if task.endless_beliefs:
         return _of_endless(task, limits, target, advice, whole=whole, verdict=verdict)
@@ -91,7 +104,27 @@ def _of_endless(
     search = search_of(task, limits.part(_SHARE))
     most = _seeing_all(task, limits.part(_SHARE))
     most = most if search is None else min(most, highest(search))
-    found = small
+    try:
+        return _policy_of_endless(
+            task, limits, target, advice, found=small, search=search, most=most, whole=whole, verdict=verdict
+        )
+    except LimitReached as reached:
+        raise OnlyBounds(reached.diagnostics, Bounds(Fraction(0), most)) from reached
+
+
+def _policy_of_endless(
+    task: Task,
+    limits: Limits,
+    target: Fraction | None,
+    advice: Advice | None,
+    *,
+    found: Best | None,
+    search: Search | None,
+    most: Fraction,
+    whole: bool,
+    verdict: bool,
+) -> Best:
+    """The same, with an upper bound, what was found in few beliefs, and a search that has not begun."""
     if found is None and target is not None and target <= most:
         found = _nearest(task, limits.part(_SHARE), target)
     if found is None and whole:

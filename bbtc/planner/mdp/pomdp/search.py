@@ -10,7 +10,11 @@ come:
 2. *Rollout*: the same by the action that gets on fastest; it finds the first ways to the goal.
 3. On the way back the bounds of each belief are made those of its best action, and it becomes a point and
    gives a vector.
-4. Where a trial finds nothing new, the upper bounds of an end component hold each other up: it is worth no
+4. *Sweeps*: the beliefs that the best known policy visits, and those beside them, are worked on again and
+   again, the last first, until nothing gets better: a policy that tries again is worth what it is only then.
+   Where nothing is known, the robot acts as one in haste that sees all would on the average of the worlds
+   (QMDP: Littman, Cassandra, Kaelbling 1995).
+5. Where a trial finds nothing new, the upper bounds of an end component hold each other up: it is worth no
    more than the best that leaves it (*deflation*: Křetínský et al. 2018). Where that changes nothing
    either, beliefs count that weigh less.
 
@@ -19,9 +23,11 @@ Numbers are floating-point ones. Beliefs whose weights agree to 40 bits count as
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import count
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -47,6 +53,10 @@ _WEIGHT = 0.02  # of the gap, that a belief must have to be visited
 _LEAST_WEIGHT = 1e-9
 _OF_ROLLOUTS = 0.05  # of that, in a rollout
 _LONGEST = 1000
+_FOLLOWED = 400  # beliefs that a policy visits which are swept
+_LOST = 1e-6  # they are visited more often than this
+_SWEEPS = 60
+_BETTER = 1e-5  # that a sweep must make some belief, for another one
 _LOOK = 16  # beliefs of a class that are visited between two looks at the clock
 _PLACES = 7  # in which figures agree that count as equal
 _DROPPED_BITS = 53 - 40
@@ -127,10 +137,14 @@ class Search:
         ``LimitReached``; what was found until then stays."""
         self._limits = limits
         share, waited = _WEIGHT, 0
+        swept = 0
         while waited < _PATIENCE and not self._done(target, verdict=verdict):
             low, high = self.bounds
             limits.check_time(_DOING, len(self._nodes))
             limits.tell(_DOING, len(self._nodes), (low, high))
+            if len(self._nodes) >= 2 * swept:
+                self._sweep()
+                swept = len(self._nodes)
             found = self._trial(share * (high - low))
             self._rollout(_OF_ROLLOUTS * share * (high - low))
             fell = 0.0 if found else self._deflate()
@@ -295,6 +309,47 @@ class Search:
             path.append(step)
         for node, _ in reversed(path):
             self._back_up(node)
+
+    def _sweep(self) -> None:
+        """Raise the lower bounds of what the best known policy visits, and of what is beside it."""
+        nodes = self._followed()
+        for node in nodes[:]:
+            nodes += [each.node for way in node.ways or () for each in way.after]
+        beside = [node for node in dict.fromkeys(nodes) if node.lower < 1.0]
+        for node in beside:
+            if node.ways is None:
+                self._visit(node)
+        for _ in range(_SWEEPS):
+            better = 0.0
+            for node in reversed(beside):
+                before = node.lower
+                self._back_up(node)
+                better = max(better, node.lower - before)
+            self._limits.check_time(_DOING, len(self._nodes))
+            if better < _BETTER:
+                break
+
+    def _followed(self) -> list[Node]:
+        """Beliefs that runs of the best known policy visit, the most probable first."""
+        order = count()
+        waiting = [(-p, next(order), node) for p, node in self._roots]
+        heapq.heapify(waiting)
+        found: dict[Node, None] = {}
+        while waiting and len(found) < _FOLLOWED:
+            weight, _, node = heapq.heappop(waiting)
+            if node in found:
+                continue
+            found[node] = None
+            if node.ways is None:
+                self._visit(node)
+            if node.ways:
+                worth = [round(self._worth(way)[0], _PLACES) for way in node.ways]
+                best = max(worth)
+                ways = [way for way, each in zip(node.ways, worth, strict=True) if each == best]
+                for each in min(ways, key=_by_haste).after:
+                    if weight * each.probability < -_LOST:
+                        heapq.heappush(waiting, (weight * each.probability, next(order), each.node))
+        return list(found)
 
     def _deflate(self) -> float:
         """How far the upper bound of an end component fell, at most."""
