@@ -31,7 +31,7 @@ from bbtc.ground.normal import Block, Chance, groups, reads
 from bbtc.ground.reachability.atoms import Atoms, Scope
 from bbtc.ground.reachability.bulk import Shared
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
-from bbtc.ground.task import ONE, ZERO, Charge, Effect, Factor, Outcome, outcomes_of
+from bbtc.ground.task import ONE, ZERO, Charge, Effect, Factor, Outcome, merge_outcomes, outcomes_of
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
@@ -502,17 +502,3 @@ def arrange(factors: Iterable[Factor]) -> tuple[Factor, ...]:
     part = _Part()
     part.draw(factors)
     return _arranged(part)
-
-
-def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
-    """Outcomes that do the same made one, with the sum of their probabilities (rule 6)."""
-    merged: dict[tuple[object, ...], Outcome] = {}
-    for outcome in outcomes:
-        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)
-        before = merged.get(key)
-        if before is not None:
-            total = before.probability + outcome.probability
-            merged[key] = replace(before, probability=total)
-        else:
-            merged[key] = outcome
-    return tuple(merged.values())

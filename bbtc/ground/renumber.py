@@ -9,7 +9,7 @@ from typing_extensions import assert_never
 
 from bbtc.ground import task as gt
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.effects import arrange, merge_outcomes
+from bbtc.ground.effects import arrange
 from bbtc.markov import distribution
 
 
@@ -66,7 +66,8 @@ class Renumbering:
     def factors(self, factors: Iterable[gt.Factor]) -> tuple[gt.Factor, ...]:
         """The factors without those that no longer do anything."""
         return arrange(
-            gt.Factor(merge_outcomes(map(self._outcome, factor.outcomes)), factor.oneof) for factor in factors
+            gt.Factor(gt.merge_outcomes(map(self._outcome, factor.outcomes)), factor.oneof)
+            for factor in factors
         )
 
     def _outcome(self, outcome: gt.Outcome) -> gt.Outcome:

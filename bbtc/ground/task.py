@@ -7,7 +7,7 @@ and costs are exact rationals.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -363,6 +363,20 @@ def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:
         for outcome in factor.outcomes:
             yield outcome
             yield from outcomes_of(outcome.factors)
+
+
+def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
+    """Outcomes that do the same made one, with the sum of their probabilities."""
+    merged: dict[tuple[object, ...], Outcome] = {}
+    for outcome in outcomes:
+        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)
+        before = merged.get(key)
+        if before is not None:
+            total = before.probability + outcome.probability
+            merged[key] = replace(before, probability=total)
+        else:
+            merged[key] = outcome
+    return tuple(merged.values())
 
 
 def effects_of(factors: Iterable[Factor]) -> Iterator[Effect]:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from bbtc.ground import task as gt
 from bbtc.ground.condition import TRUE, Condition, disjunction, is_test, leaves
-from bbtc.ground.effects import merge_outcomes
 from bbtc.kleene import Truth
 
 
@@ -57,7 +56,7 @@ def _take(parts: Parts, factor: gt.Factor) -> None:
         replace(outcome, effects=effects_of(setting for setting in settings if setting not in common))
         for outcome, settings in zip(factor.outcomes, every, strict=True)
     ]
-    merged = gt.Factor(merge_outcomes(rest), factor.oneof)
+    merged = gt.Factor(gt.merge_outcomes(rest), factor.oneof)
     if len(merged.outcomes) == 1:
         _take(parts, merged)
     else:
@@ -149,7 +148,7 @@ def _coin(variable: int, when: Condition, odds: Mapping[int, Fraction]) -> gt.Fa
 
 def only(factor: gt.Factor, kept: Set[int]) -> gt.Factor | None:
     """A factor without effects on variables that are not kept; None where nothing is left of it."""
-    outcomes = merge_outcomes(_only(outcome, kept) for outcome in factor.outcomes)
+    outcomes = gt.merge_outcomes(_only(outcome, kept) for outcome in factor.outcomes)
     (first, *_) = outcomes
     plain = first.effects or first.factors or first.charges or first.cost or first.reward
     return gt.Factor(outcomes, factor.oneof) if len(outcomes) > 1 or plain else None
