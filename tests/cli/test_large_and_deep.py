@@ -105,6 +105,9 @@ def test_limits_hold_while_large_input_is_read(tmp_path: Path, command: list[str
     file.write_text(f"(define (domain d) (:predicates (p) (g)) {actions})" + PROBLEM.format("", "(p)"))
     done = run(*command, file, "--time-limit", "0.4", statuses=(3,))
     assert "the time limit of 0.4 s ended" in done.err
+    assert "a59999" in file.read_text()
+    if command[0] in {"check", "compile"} and not LONG:
+        return  # they read as the two others do
     # In a process that has nothing yet, which is within the limit.
     alone = subprocess.run(
         [sys.executable, "-m", "bbtc.cli.main", *command, str(file), "--max-memory", "60"],
@@ -112,7 +115,6 @@ def test_limits_hold_while_large_input_is_read(tmp_path: Path, command: list[str
     )  # fmt: skip
     assert alone.returncode == 3, alone.stderr[-2000:]
     assert "60 MiB of memory ended" in alone.stderr
-    assert "a59999" in file.read_text()
 
 
 # --- deep ----------------------------------------------------------------------------------------
@@ -261,8 +263,9 @@ def test_long_chains(tmp_path: Path, text: str, statuses: tuple[int, ...]) -> No
     for words in (["check"], ["fmt"], ["compile", "-o", tmp_path / "task.json"]):
         done = run(*words, file, statuses=statuses if words[0] == "compile" else (0,))
         assert done.seconds < MOST_SECONDS
-    done = run("plan", file, "-q", "--time-limit", "none", "-o", tmp_path / "tree.json", statuses=statuses)
+    if text == "templates" or LONG:
+        made = tmp_path / "tree.json"
+        done = run("plan", file, "-q", "--time-limit", "none", "-o", made, statuses=statuses)
+        assert statuses == (1,) or bbtc.load_tree(made).success_probability == 1
     if text == "derived":
         assert "BBT0408" in done.err
-    else:
-        assert bbtc.load_tree(tmp_path / "tree.json").success_probability == 1
