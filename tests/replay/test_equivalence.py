@@ -21,7 +21,7 @@ from bbtc.limits import Limits
 from bbtc.replay.script import Timing, run_of, script_of
 from bbtc.tree.nodes import Tree
 from tests.long_form import LONG, amount
-from tests.replay.all_engines import ENGINES, Compared, EngineName, Runtime, engine
+from tests.replay.all_engines import ENGINES, Compared, EngineName, Runtime, engine, part_for
 from tests.replay.covering import covering
 from tests.replay.random_trees import busy_tree
 from tests.replay.reference import expected_run
@@ -63,7 +63,7 @@ def test_random_trees_run_as_simulated(
 ) -> None:
     with engine(name) as (version, make):
         compared = Compared(record_property, f"random trees: simulator and {version}")
-        for seed, tree, runs in lively_trees(chunk):
+        for seed, tree, runs in part_for(name, lively_trees(chunk)):
             runtime: Runtime = "imported" if seed % 3 else "embedded"
             replay = make(tree, runtime)
             jobs = list(_jobs(runs, ENGINES.index(name)))

@@ -11,7 +11,7 @@ import pytest
 from bbtc.replay.script import TIMINGS, Run, Script, Timing
 from bbtc.tree.nodes import Tree
 from tests.long_form import LONG, amount
-from tests.replay.all_engines import ENGINES, Compared, EngineName, engine
+from tests.replay.all_engines import ENGINES, Compared, EngineName, engine, part_for
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import varied_runs
 from tests.sharing import shared
@@ -42,7 +42,7 @@ def test_random_trees_run_as_in_the_reference(
 ) -> None:
     with engine(name) as (version, make):
         compared = Compared(record_property, f"random trees with repeated actions: reference and {version}")
-        for tree, runs in lively_trees():
+        for tree, runs in part_for(name, lively_trees()):
             replay = make(tree, "embedded")
             jobs = list(_jobs(runs, ENGINES.index(name)))
             done = replay.runs((script, timing) for script, _, timing in jobs)
