@@ -7,6 +7,7 @@ often it tries again (:mod:`bbtc.rewrite.retry`). 5. Simulate.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -133,15 +134,21 @@ class _Search:
         few = replace(self.limits, states=max(self.limits.states, len(found.space.states), _ENOUGH))
         try:
             way = likely_way(found)
-            if way is not None and not self.best.success:
-                # It is small, and so there is always time for it.
-                self._draft(way, replace(few, seconds=None, until=None))
+            if way is not None:
+                self._surely(lambda limits: self._draft(way, limits), few)
             limits = few.overtime(GRACE)
             for policy in (one_policy(found), *(likely_policy(found, most) for most in _DRAFTS)):
                 if policy is not None and not self._is_reached(found.initial.lower):
                     self._draft(policy, limits)
         except KeyboardInterrupt:
             self.interrupted = True
+
+    def _surely(self, draft: Callable[[Limits], None], few: Limits) -> None:
+        """Write down what is small, and so has always time and memory enough, if nothing else succeeds. The
+        watch over the limits may interrupt it once: it leaves a second until it does so again."""
+        for _ in range(2):
+            if not self.best.success:
+                draft(replace(few, seconds=None, until=None, memory=None))
 
     def _is_reached(self, attained: Fraction) -> bool:
         """Is the tree as good as the policy that is known, or as the target asks for?"""
@@ -158,7 +165,7 @@ class _Search:
         try:
             way = likely_way_within(horizon)
             if way is not None:
-                self._draft_within([way], replace(few, seconds=None, until=None))
+                self._surely(lambda limits: self._draft_within([way], limits), few)
             if not self._is_reached(attained):
                 limits = few.overtime(GRACE)
                 with suppress(LimitReached):
