@@ -27,7 +27,7 @@ Watcher: TypeAlias = Callable[[Stage], None]
 MOST_WORLDS = 4096
 """So many worlds of a component of hidden facts are listed, and a draw of the start has so many results."""
 
-MOST_NODES = 200_000
+MOST_NODES = 100_000
 """So many nodes of decision diagrams are made to write down what is thought of a component at the start."""
 
 PLANNING_SECONDS = 60.0

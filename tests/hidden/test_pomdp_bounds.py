@@ -83,6 +83,7 @@ def test_a_small_tree_attains_what_is_attained(name: str, most: int) -> None:
     assert not verify_tree(tree, Limits(), "own").problems
 
 
+@pytest.mark.skipif(not amount(0, 1), reason="takes seconds: a long form")
 def test_where_beliefs_read_alike_a_tree_counts() -> None:
     """Nothing tells the robot where it is: it goes to one wall, then to the other, so many steps each."""
     tree = plan_task(

@@ -57,7 +57,7 @@ def value(text: str) -> Fraction:
 def test_random_tasks_are_worth_what_their_words_say() -> None:
     """P* and the least number of actions, over all beliefs of the text and all of the domain's words. In
     states that look alike the same may be done, or reading the text would fail."""
-    many = amount(80, 4_000)
+    many = amount(40, 4_000)
     done: Counter[str] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])
@@ -85,7 +85,7 @@ def test_random_tasks_are_worth_what_their_words_say() -> None:
 
 def test_random_tasks_with_noise_are_worth_what_their_words_say() -> None:
     """Within three actions."""
-    many = amount(80, 1_500)
+    many = amount(40, 1_500)
     done: Counter[bool] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])

@@ -196,8 +196,8 @@ def test_simulated_worlds_of_exports_begin_there(text: str, tmp_path: Path) -> N
 
 
 def test_worlds_that_are_not_listed_are_given_too(tmp_path: Path) -> None:
-    """16,383 of them; two balls are somewhere."""
-    cups = [f"c{number}" for number in range(14)]
+    """8,191 of them; two balls are somewhere."""
+    cups = [f"c{number}" for number in range(13)]
     text = f"""(define (domain many) (:predicates (ball ?c) (found))
       (:action look :parameters (?c) :observe (ball ?c))
       (:action ask :observe (exists (?c) (ball ?c)))

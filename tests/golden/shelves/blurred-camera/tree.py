@@ -670,8 +670,8 @@ class Telling:
 
 
 class HiddenWorld(World):
-    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``, and one
-    after the other along ``walks``, and the robot is told no more than ``tellings`` say."""
+    """A world with hidden facts: they are drawn at the start, one choice for each of ``priors``,
+    and one after the other along ``walks``, and the robot is told no more than ``tellings`` say."""
 
     def __init__(
         self,
