@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
+from math import inf, prod
 
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import explore
@@ -53,7 +54,7 @@ def worst_world(task: Task, root: Node, limits: Limits) -> WorstWorld | None:
     if full is None:
         return None
     search = _Worlds(full, root)
-    return search.worst(limits) if search.count is not None and search.count <= MOST_WORLDS else None
+    return search.worst(limits) if search.count <= MOST_WORLDS else None
 
 
 class _Worlds:
@@ -74,11 +75,9 @@ class _Worlds:
             self._place[index] = place
             place += len(task.components[index].facts)
         self._changes: dict[Change, tuple[Readings, dict[tuple[int, bytes, int], dict[Draw, Fraction]]]] = {}
-        self.count: int | None = 1
-        """So many worlds those that matter have together; None where they are not even listed."""
-        for index in self._matter:
-            listed = task.components[index].diagram is None
-            self.count = self.count * len(task.components[index].prior) if listed and self.count else None
+        components = [task.components[index] for index in self._matter]
+        self.count = prod(inf if each.diagram is not None else len(each.prior) for each in components)
+        """So many worlds those that matter have together."""
 
     def worst(self, limits: Limits) -> WorstWorld:
         """The worst of all worlds, the first of several."""

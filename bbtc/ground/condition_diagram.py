@@ -12,7 +12,7 @@ from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
 from bbtc.ground.task import Component
 from bbtc.kleene import Truth
 
-MOST_NODES = 4_000_000
+MOST_NODES_OF_BELIEFS = 4_000_000
 """So many nodes the diagrams of a component may have while beliefs are looked at."""
 
 
@@ -64,7 +64,7 @@ def diagrams_of(component: Component) -> ConditionDiagrams:
     found = component.memo.get("diagrams")
     if not isinstance(found, ConditionDiagrams):
         assert component.diagram is not None
-        diagrams = Diagrams(component.diagram.order, MOST_NODES)
+        diagrams = Diagrams(component.diagram.order, MOST_NODES_OF_BELIEFS)
         found = ConditionDiagrams(diagrams, diagrams.read(component.diagram))
         component.memo["diagrams"] = found
     return found

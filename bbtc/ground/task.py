@@ -155,6 +155,13 @@ class Knowledge:
     condition: Condition
     at_least: Fraction = Fraction(1)
 
+    def value(self, weight: int, total: int) -> Truth:
+        """What is believed where worlds of this weight, of a total, make the condition true."""
+        enough = self.at_least.numerator * total
+        if weight * self.at_least.denominator >= enough:
+            return Truth.TRUE
+        return Truth.FALSE if (total - weight) * self.at_least.denominator >= enough else Truth.UNKNOWN
+
 
 @dataclass(frozen=True)
 class Component:

@@ -68,7 +68,7 @@ class Beliefs(ABC):
     def believed(self, number: int, knowledge: Knowledge) -> Truth:
         """What is believed of something in a belief."""
         chance = self.chance(number, knowledge.condition)
-        return believed(chance.numerator, chance.denominator, knowledge.at_least)
+        return knowledge.value(chance.numerator, chance.denominator)
 
     @property
     @abstractmethod
@@ -91,14 +91,6 @@ class Beliefs(ABC):
     def updates(self, kernel: Kernel, number: int, seen: bytes, spend: Spend) -> Iterator[Update]:
         """What the robot may be told by a change where this was believed, and the seen variables had these
         values."""
-
-
-def believed(weight: int, total: int, at_least: Fraction) -> Truth:
-    """What is believed of a condition with this weight."""
-    enough = at_least.numerator * total
-    if weight * at_least.denominator >= enough:
-        return Truth.TRUE
-    return Truth.FALSE if (total - weight) * at_least.denominator >= enough else Truth.UNKNOWN
 
 
 @dataclass
@@ -137,7 +129,7 @@ class ListedBeliefs(Beliefs):
                 true[at] += weight
         total = sum(weight for _, weight in belief)
         return tuple(
-            (knowledge.variable, int(believed(weight, total, knowledge.at_least)))
+            (knowledge.variable, int(knowledge.value(weight, total)))
             for knowledge, weight in zip(self.component.known, true, strict=True)
         )
 

@@ -13,7 +13,7 @@ from math import lcm
 from typing import NamedTuple
 
 from bbtc.belief.draws import Delta, Spend
-from bbtc.belief.worlds.beliefs import Beliefs, Update, believed
+from bbtc.belief.worlds.beliefs import Beliefs, Update
 from bbtc.belief.worlds.kernel import Kernel, Part, Told
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.diagrams import NOTHING, TooManyNodes, Weighted
@@ -28,7 +28,7 @@ from bbtc.ground.condition import (
     replaced,
     variables,
 )
-from bbtc.ground.condition_diagram import MOST_NODES, diagrams_of
+from bbtc.ground.condition_diagram import MOST_NODES_OF_BELIEFS, diagrams_of
 from bbtc.ground.hidden.parts import facts_of
 from bbtc.ground.task import ZERO, Knowledge
 from bbtc.kleene import Truth
@@ -76,7 +76,7 @@ class DiagramBeliefs(Beliefs):
                     yield each.variable, int(Truth.TRUE if true else Truth.FALSE if false else Truth.UNKNOWN)
                 case condition:
                     weight, total = self._of.share(node, condition)
-                    yield each.variable, int(believed(weight, total, each.at_least))
+                    yield each.variable, int(each.value(weight, total))
 
     def _chance(self, number: int, condition: Condition) -> Fraction:
         return Fraction(*self._of.share(self._nodes[number], condition))
@@ -108,7 +108,7 @@ class DiagramBeliefs(Beliefs):
         except TooManyNodes:
             message = (
                 f"what is known of {self.component.facts[0]} and the facts that depend on it takes more than "
-                f"{MOST_NODES:,} nodes of decision diagrams"
+                f"{MOST_NODES_OF_BELIEFS:,} nodes of decision diagrams"
             )
             hint = "a domain in which fewer facts depend on each other may be planned for"
             raise LimitReached([Diagnostic("BBT0007", message, hint=hint)]) from None

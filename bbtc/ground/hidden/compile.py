@@ -424,10 +424,7 @@ def _read_together(task: gt.Task, sizes: Sequence[int]) -> list[dict[tuple[int, 
 def _known_at_first(component: gt.Component) -> Iterator[tuple[int, Truth]]:
     """What the prior tells."""
     for each, chance in zip(component.known, _chances(component), strict=True):
-        if chance >= each.at_least:
-            yield each.variable, Truth.TRUE
-        else:
-            yield each.variable, Truth.FALSE if 1 - chance >= each.at_least else Truth.UNKNOWN
+        yield each.variable, each.value(chance.numerator, chance.denominator)
 
 
 def _chances(component: gt.Component) -> Iterator[Fraction]:

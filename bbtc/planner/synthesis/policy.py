@@ -134,7 +134,7 @@ class _Search:
         few = replace(self.limits, states=max(self.limits.states, len(found.space.states), _ENOUGH))
         try:
             way = likely_way(found)
-            if way is not None:
+            if way is not None and not self.best.success:
                 self._surely(lambda limits: self._draft(way, limits), few)
             limits = few.overtime(GRACE)
             for policy in (one_policy(found), *(likely_policy(found, most) for most in _DRAFTS)):
@@ -144,11 +144,12 @@ class _Search:
             self.interrupted = True
 
     def _surely(self, draft: Callable[[Limits], None], few: Limits) -> None:
-        """Write down what is small, and so has always time and memory enough, if nothing else succeeds. The
-        watch over the limits may interrupt it once: it leaves a second until it does so again."""
-        for _ in range(2):
-            if not self.best.success:
-                draft(replace(few, seconds=None, until=None, memory=None))
+        """Write down what is small, and so has always time and memory enough. The watch over the limits may
+        interrupt it once: it leaves a second until it does so again."""
+        endless = replace(few, seconds=None, until=None, memory=None)
+        draft(endless)
+        if not self.best.success:
+            draft(endless)
 
     def _is_reached(self, attained: Fraction) -> bool:
         """Is the tree as good as the policy that is known, or as the target asks for?"""
