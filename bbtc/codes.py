@@ -142,6 +142,7 @@ _CODES = (
     Code("BBT0430", "too much for the text of a partially observable process"),
     Code("BBT0431", "true world that cannot be", _WARNING),
     Code("BBT0432", "reading that tells nothing, or the contrary"),
+    Code("BBT0433", "file that does not hold what an action may set", _WARNING),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

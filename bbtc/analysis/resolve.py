@@ -199,6 +199,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
         None if node.observe is None else node.observe.span,
         node.repeats,
         told,
+        node.uninterruptible,
         node.span,
     )
 

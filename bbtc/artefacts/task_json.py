@@ -127,6 +127,8 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
     }
     if action.changes:
         value["changes"] = [_change_to_json(change, task) for change in action.changes]
+    if action.uninterruptible:
+        value["uninterruptible"] = True
     return value
 
 
@@ -444,7 +446,8 @@ class _Reader:
 
     def action(self, at: At) -> GroundAction:
         members = at.members(
-            ["name", "schema", "args", "cost", "precondition"], ["outcomes", "factors", "oneof", "changes"]
+            ["name", "schema", "args", "cost", "precondition"],
+            ["outcomes", "factors", "oneof", "changes", "uninterruptible"],
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -455,6 +458,7 @@ class _Reader:
             self.chance(at, members),
             members["cost"].given(),
             tuple(self.change(each) for each in _optional(members, "changes")),
+            "uninterruptible" in members and members["uninterruptible"].flag(),
         )
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:

@@ -59,6 +59,8 @@ class Schema:
     repeats: bool = False
     told: tuple[Reading, ...] = ()
     """What is told besides."""
+    uninterruptible: bool = False
+    """While it runs, nothing preempts it."""
     span: Span | None = field(default=None, compare=False, repr=False)
 
     @property

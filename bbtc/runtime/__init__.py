@@ -15,6 +15,7 @@ from bbtc.runtime.nodes import (
     StopWhenBlocked,
     Try,
     UntilSuccess,
+    View,
     WithBeliefs,
     WithSetup,
     all_of,
@@ -27,6 +28,7 @@ from bbtc.runtime.nodes import (
     sequence,
     skipper,
     until_success,
+    view,
 )
 from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
@@ -50,6 +52,7 @@ __all__ = [
     "Telling",
     "Try",
     "UntilSuccess",
+    "View",
     "Walk",
     "When",
     "WithBeliefs",
@@ -68,5 +71,6 @@ __all__ = [
     "simulate",
     "skipper",
     "until_success",
+    "view",
     "watched",
 ]

@@ -286,7 +286,7 @@ class Functions:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """``(:action name :parameters … :precondition … :observe … :repeats :effect …)``."""
+    """``(:action name :parameters … :precondition … :observe … :repeats :uninterruptible :effect …)``."""
 
     name: Name
     parameters: TypedList
@@ -295,6 +295,7 @@ class Action:
     effect: Effect | None
     span: Span = span_field()
     repeats: bool = False
+    uninterruptible: bool = False
 
 
 @dataclass(frozen=True, slots=True)

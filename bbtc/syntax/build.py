@@ -80,6 +80,10 @@ class Repeats(Field[bool]):
     """``:repeats``."""
 
 
+class Uninterruptible(Field[bool]):
+    """``:uninterruptible``."""
+
+
 class Body(Field[ast.Body]):
     """``:body`` of a template."""
 
@@ -232,6 +236,7 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            fields.get(Uninterruptible) is True,
         )
 
     def template(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Template:
@@ -285,6 +290,9 @@ class Builder(Expressions):
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
+
+    def uninterruptible(self, keyword: Token) -> Uninterruptible:
+        return Uninterruptible(keyword, True)
 
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
         return Observe(keyword, _observed(formulas))

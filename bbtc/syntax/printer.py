@@ -458,7 +458,8 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
             tells = f":{node.observe.word}" if isinstance(node.observe, ast.SensingModel) else ":observe"
             observed = (tells, node.observe)
             repeats = (":repeats", node.repeats)
-            return [(":precondition", node.precondition), observed, repeats, (":effect", node.effect)]
+            whole = (":uninterruptible", node.uninterruptible)
+            return [(":precondition", node.precondition), observed, repeats, whole, (":effect", node.effect)]
         case ast.Template():
             return [(":precondition", node.precondition), (":effect", node.effect), (":body", node.body)]
         case ast.ObservationModel():
