@@ -113,9 +113,9 @@ def _our_nodes(model: Element) -> None:
     keep.text = "whether the action runs once and its status is kept"
     flag = SubElement(latch, "input_port", name="flag", type="std::string", default="acting")
     flag.text = "entry of the root blackboard that is set to true while the action runs"
-    entry = SubElement(latch, "input_port", name="entry", type="std::string")
+    entry = SubElement(latch, "input_port", name="entry", type="std::string", default="")
     entry.text = "entry of the blackboard that its status is kept in"
-    sets = SubElement(latch, "input_port", name="sets", type="std::string")
+    sets = SubElement(latch, "input_port", name="sets", type="std::string", default="")
     sets.text = "the facts that are held while the action runs"
     SubElement(latch, "description").text = (
         "Runs the action that is its last child, once the children before it have succeeded; its "

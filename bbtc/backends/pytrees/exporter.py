@@ -165,7 +165,8 @@ class _Writer:
         if not self.held:
             return []
         table = mapping(
-            (literal(action), sequence(map(self._asked, facts))) for action, facts in sorted(self.held.items())
+            (literal(action), sequence(map(self._asked, facts)))
+            for action, facts in sorted(self.held.items())
         )
         return [
             [

@@ -128,8 +128,9 @@ class Latch : public BT::ControlNode {
             BT::InputPort<std::string>(
                 "flag", "acting",
                 "entry of the root blackboard that is set to true while the action runs"),
-            BT::InputPort<std::string>("entry", "entry of the blackboard that its status is kept in"),
-            BT::InputPort<std::string>("sets", "the facts that are held while the action runs")};
+            BT::InputPort<std::string>("entry", "",
+                                       "entry of the blackboard that its status is kept in"),
+            BT::InputPort<std::string>("sets", "", "the facts that are held while the action runs")};
   }
 
   void halt() override {
