@@ -12,7 +12,7 @@ from typing_extensions import assert_never
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
-from bbtc.ground.effects import EffectLowering, LoweredEffect
+from bbtc.ground.effects import EffectLowering, LoweredEffect, arrange
 from bbtc.ground.events import clashes
 from bbtc.ground.goal import unreachable
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
@@ -168,6 +168,8 @@ class TaskBuilder:
             met = [condition is not FALSE for condition in found]
             chunk, found = list(compress(some, met)), list(compress(found, met))
             done = effects.all(chunk)
+            if schema.during is not None and counts_cost:  # it costs nothing where it does not happen
+                done = [(self._with_cost(*each), Fraction(0)) for each in done]
             made += instances(
                 gt.GroundAction,
                 len(chunk),
@@ -192,14 +194,12 @@ class TaskBuilder:
         condition = self.lowering.condition(schema.during, frame)
         abort = self.effects.effect(normalise(schema.on_abort), frame, schema.span)
         envs = [frame.env(row) for row in rows]
-        return [condition(env) for env in envs], [self._aborted(*abort.factors(env)) for env in envs]
+        return [condition(env) for env in envs], [self._with_cost(*abort.factors(env)) for env in envs]
 
     @staticmethod
-    def _aborted(factors: tuple[gt.Factor, ...], cost: Fraction) -> tuple[gt.Factor, ...]:
+    def _with_cost(factors: tuple[gt.Factor, ...], cost: Fraction) -> tuple[gt.Factor, ...]:
         """What happens, with the cost that is certain among it."""
-        if not cost:
-            return factors
-        return (*factors, gt.Factor((gt.Outcome(Fraction(1), (), cost=cost),)))
+        return factors if not cost else arrange([*factors, gt.Factor((gt.Outcome(gt.ONE, (), cost=cost),))])
 
     # --- events ------------------------------------------------------------------------------
 
@@ -211,7 +211,7 @@ class TaskBuilder:
                 each.schema,
                 each.args,
                 each.precondition,
-                self._aborted(each.factors, each.cost if self.model.counts_cost else Fraction(0)),
+                self._with_cost(each.factors, each.cost if self.model.counts_cost else Fraction(0)),
                 rounds[name],
                 each.span,
             )
