@@ -109,7 +109,8 @@ def _variable_to_json(variable: Variable) -> Json:
     value: Json = {"name": variable.name}
     if split_name(variable.name) != (variable.predicate, variable.args):
         value |= {"predicate": variable.predicate, "args": list(variable.args)}
-    return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    value |= {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    return value | ({"external": True} if variable.external else {})
 
 
 def _change_to_json(change: Change, task: Task) -> Json:
@@ -351,7 +352,7 @@ def _metric(members: Mapping[str, At]) -> Literal["cost", "reward"]:
 
 
 def _variable(at: At) -> Variable:
-    members = at.members(["name", "values"], ["hidden", "predicate", "args"])
+    members = at.members(["name", "values"], ["hidden", "predicate", "args", "external"])
     name = members["name"].string()
     if "predicate" in members or "args" in members:
         at.members(["predicate", "args"], list(members))  # both or neither
@@ -363,7 +364,8 @@ def _variable(at: At) -> Variable:
     if sorted(values) not in (["false", "true"], ["false", "true", "unknown"]):
         raise members["values"].fault("BBT0604", "the values are true, false and, for some, unknown")
     hidden = "hidden" in members and members["hidden"].flag()
-    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden)
+    external = "external" in members and members["external"].flag()
+    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden, external=external)
 
 
 def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:

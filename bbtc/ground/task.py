@@ -40,13 +40,15 @@ def unused_name(name: str, taken: Collection[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown."""
+    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
+    others change it, of whom the task knows nothing."""
 
     predicate: str
     args: tuple[str, ...]
     three_valued: bool
     hidden: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+    external: bool = False
 
     @property
     def name(self) -> str:

@@ -78,6 +78,11 @@ class Schema:
     span: Span | None = field(default=None, compare=False, repr=False)
 
     @property
+    def kind(self) -> Literal["action", "event"]:
+        """What messages call it."""
+        return "action" if self.exogenous is None else "event"
+
+    @property
     def effects(self) -> Effect:
         """All that it may do: its effect, and what happens where it is aborted."""
         return self.effect if self.on_abort is NOTHING else Together((self.effect, self.on_abort))
