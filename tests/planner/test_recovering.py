@@ -43,7 +43,7 @@ def tree_of(task: Task) -> Node:
     return found.root
 
 
-@examples(amount(80, 3000))
+@examples(amount(50, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 @example(of=journey(20308515))  # runs of even the best policies take thousands of steps
 def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) -> None:
@@ -57,7 +57,7 @@ def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) ->
         assert attained[state] >= best_next(of, state, attained) - 1e-9
 
 
-@examples(amount(80, 3000))
+@examples(amount(50, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
     found = recovering_tree(of, Limits())
