@@ -28,7 +28,7 @@ from tests.disturbance.reference import Exact, best_next, reachable
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.long_form import amount
 from tests.planner.journeys import journey, journeys
-from tests.planner.test_auto import plan
+from tests.planner.test_auto import told
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -78,7 +78,7 @@ def test_trees_of_our_domains_recover(problem: Problem) -> None:
         pytest.skip("there is no end to what may be believed")
     if problem.domain in LARGE and problem.name != "after-the-alarm":
         pytest.skip("too many states for each")
-    done = plan(of, "auto")
+    done, _ = told(problem)
     found = recovery(of, done.tree.root, Limits())
     assert (found.attained, found.missed) == (found.hopeful, 0)
     assert verify_tree(guarded(done).tree, Limits(), "own").problems == ()

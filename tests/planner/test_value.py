@@ -115,7 +115,7 @@ def after_steps(of: Task, choices: Choices, steps: int) -> dict[Values, Fraction
     return value
 
 
-@examples(amount(100, 200))
+@examples(amount(70, 200))
 @given(of=tasks())
 def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task) -> None:
     """A value that a policy attains and that solves the optimality inequalities is P*."""
@@ -147,7 +147,7 @@ def test_the_value_is_attained_by_its_policy_and_by_no_choice_exceeded(of: Task)
     assert solve(rows_of, [wins[s] for s in positive]) == [values[s] for s in positive]
 
 
-@examples(amount(50, 100))
+@examples(amount(35, 100))
 @given(of=tasks())
 def test_budgets_have_the_values_of_the_definition_and_approach_the_value(of: Task) -> None:
     choices = choices_of(of)
@@ -188,7 +188,7 @@ def best_probability(space: StateSpace, limits: Limits) -> Bounds:
     return Bounds(low.lower, max_prob(space, limits, space.goal | space.fringe).initial.upper)
 
 
-@examples(amount(50, 100))
+@examples(amount(35, 100))
 @given(of=tasks())
 def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
     whole = explore_space(of, Limits())
@@ -200,7 +200,7 @@ def test_a_part_of_the_space_gives_bounds(of: Task) -> None:
         assert bounds.lower <= known <= bounds.upper
 
 
-@examples(amount(80, 150))
+@examples(amount(60, 150))
 @given(of=tasks())
 def test_the_least_cost_is_attained_and_by_no_choice_undercut(of: Task) -> None:
     found = solved(of)
