@@ -27,7 +27,7 @@ from tests.profiles import examples
 from tests.strategies import tasks
 
 T, F, U = Truth.TRUE, Truth.FALSE, Truth.UNKNOWN
-MANY = examples(amount(50, 5000))
+MANY = examples(amount(36, 5000))
 """Random tasks of one kind."""
 
 
