@@ -80,6 +80,22 @@ class Repeats(Field[bool]):
     """``:repeats``."""
 
 
+class During(Field[ast.Formula]):
+    """``:while``."""
+
+
+class OnAbort(Field[ast.Effect]):
+    """``:on-abort``."""
+
+
+class Per(Field[ast.Name]):
+    """``:per``."""
+
+
+class Before(Field[tuple[ast.Name, ...]]):
+    """``:before``."""
+
+
 class Body(Field[ast.Body]):
     """``:body`` of a template."""
 
@@ -232,6 +248,20 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            fields.get(During),
+            fields.get(OnAbort),
+        )
+
+    def exogenous(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Exogenous:
+        fields = _Fields(given)
+        return ast.Exogenous(
+            leaves.name(name),
+            fields.parameters(close),
+            fields.get(Condition),
+            fields.need(Effect, ":effect", "the event", name),
+            fields.get(Per),
+            fields.get(Before),
+            head.to(close),
         )
 
     def template(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Template:
@@ -282,6 +312,14 @@ class Builder(Expressions):
     effect = Effect
     template_body = Body
     axiom_head = Implied
+    during = During
+    on_abort = OnAbort
+
+    def per(self, keyword: Token, name: Token) -> Per:
+        return Per(keyword, leaves.name(name))
+
+    def before(self, keyword: Token, names: Token) -> Before:
+        return Before(keyword, tuple(leaves.names(names)))
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)

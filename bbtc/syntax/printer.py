@@ -15,7 +15,7 @@ from bbtc.syntax.layout import Doc, Setter, has_empty_lines
 from bbtc.syntax.scan import without_comments
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
-_Schema: TypeAlias = ast.Action | ast.Template | ast.Sensor | ast.ObservationModel
+_Schema: TypeAlias = ast.Action | ast.Exogenous | ast.Template | ast.Sensor | ast.ObservationModel
 
 
 def print_document(document: ast.Document) -> str:
@@ -74,7 +74,7 @@ class _Docs:
                 return self.listed("(:predicates", map(self.predicate, node.declarations), node, apart=True)
             case ast.Functions():
                 return self.listed("(:functions", map(self.function, node.declarations), node)
-            case ast.Action() | ast.Template() | ast.Sensor() | ast.ObservationModel():
+            case ast.Action() | ast.Exogenous() | ast.Template() | ast.Sensor() | ast.ObservationModel():
                 return self.schema(node)
             case ast.Derived():
                 return self.derived(node)
@@ -132,7 +132,11 @@ class _Docs:
                     doc = self.observed(value.content)
                 case ast.SensingModel():
                     doc = self.effect(value.effect)
-                case _ if word in {":effect", ":distribution"}:
+                case ast.Name():
+                    doc = _leaf(value)
+                case tuple():
+                    doc = self._names(value)
+                case _ if word in {":effect", ":distribution", ":on-abort"}:
                     doc = self.effect(value)
                 case _ if word == ":body":
                     doc = self.body(value)
@@ -143,6 +147,13 @@ class _Docs:
         return Doc(
             head, (_leaf(node.name), *_in_source_order(fields)), ")", span, 1, broken=True, spaced=True
         )
+
+    def _names(self, names: tuple[ast.Name, ...]) -> Doc:
+        """Names of events: one alone, or several in parentheses."""
+        if len(names) == 1:
+            return _leaf(names[0])
+        span = Span(names[0].span.source, names[0].span.start, names[-1].span.end)
+        return Doc("(", tuple(map(_leaf, names)), ")", span, glued=1)
 
     def _spelt(self, words: Sequence[str], after: int, span: Span) -> str:
         """Of words that mean the same, the one that stands in a form; the first where none does."""
@@ -458,7 +469,17 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
             tells = f":{node.observe.word}" if isinstance(node.observe, ast.SensingModel) else ":observe"
             observed = (tells, node.observe)
             repeats = (":repeats", node.repeats)
-            return [(":precondition", node.precondition), observed, repeats, (":effect", node.effect)]
+            during = [(":while", node.during), (":on-abort", node.on_abort)]
+            return [
+                (":precondition", node.precondition),
+                observed,
+                repeats,
+                (":effect", node.effect),
+                *during,
+            ]
+        case ast.Exogenous():
+            when = [(":precondition", node.precondition), (":per", node.per), (":before", node.before)]
+            return [*when, (":effect", node.effect)]
         case ast.Template():
             return [(":precondition", node.precondition), (":effect", node.effect), (":body", node.body)]
         case ast.ObservationModel():
