@@ -142,6 +142,10 @@ _CODES = (
     Code("BBT0430", "too much for the text of a partially observable process"),
     Code("BBT0431", "true world that cannot be", _WARNING),
     Code("BBT0432", "reading that tells nothing, or the contrary"),
+    Code("BBT0443", "duration that cannot be"),
+    Code("BBT0444", "time-out that cannot be"),
+    Code("BBT0445", "time-out beside hidden facts"),
+    Code("BBT0446", "time that is not known"),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

@@ -335,7 +335,7 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
 def _probabilities(known: Known) -> Iterator[Diagnostic]:
     for schema in known.model.schemas.values():
         for part in me.walk(schema.effect):
-            if isinstance(part, me.Choice):
+            if isinstance(part, me.Choice) and part.timeout is None:
                 yield from _doubtful(part)
 
 
@@ -380,11 +380,11 @@ def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
 def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
     """Whether renaming the parameter changes the action."""
     renamed = _renamed(schema, {parameter.name: other.name})
-    return renamed != (schema.precondition, schema.effect, schema.observe, schema.told)
+    return renamed != (schema.precondition, schema.effect, schema.observe, schema.told, schema.duration)
 
 
-def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, object, object, object]:
-    """Precondition, effect and observations with other parameters."""
+def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, ...]:
+    """Precondition, effect, observations and duration with other parameters."""
     free, observed = dict(binding), schema.observe
     told: object = None
     if isinstance(observed, me.Choice):
@@ -395,7 +395,9 @@ def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object,
         replace(each, condition=mf.substitute(each.condition, free), when=mf.substitute(each.when, free))
         for each in schema.told
     )
-    return mf.substitute(schema.precondition, free), me.substitute(schema.effect, free), told, besides
+    duration = me.substitute_duration(schema.duration, free)
+    effect = me.substitute(schema.effect, free)
+    return mf.substitute(schema.precondition, free), effect, told, besides, duration
 
 
 def _unused_templates(known: Known) -> Iterator[Diagnostic]:

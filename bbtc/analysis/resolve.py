@@ -12,6 +12,7 @@ from bbtc.analysis import bodies, facts, formulas, po_pddl, replanner, truth_wor
 from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
+from bbtc.analysis.timing import timed
 from bbtc.diagnostics import Related, Report
 from bbtc.kleene import Truth
 from bbtc.markov import reachable
@@ -190,7 +191,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
             assert_never(node.observe)
     if node.repeats:
         _check_repeats(names, f"action `{signature.name}`", observe, node.name.span)
-    return md.Schema(
+    schema = md.Schema(
         signature.name,
         signature.parameters,
         mf.ALWAYS if node.precondition is None else formulas.formula(names, node.precondition, scope),
@@ -201,6 +202,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
         told,
         node.span,
     )
+    return timed(names, schema, node.timing, scope)
 
 
 def _observables(domain: ast.Definition) -> frozenset[str]:

@@ -16,11 +16,13 @@ from typing_extensions import assert_never
 
 from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of, variable_from_json
 from bbtc.artefacts.cursor import At, Faults, clip, run_reader
+from bbtc.artefacts.duration_json import duration_from_json, duration_to_json
 from bbtc.artefacts.hidden_json import component_to_json, observation_to_json, true_world, true_world_to_json
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
 from bbtc.artefacts.prior_json import check_sum, prior_from_json
 from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.durations import LONGEST
 from bbtc.ground.condition import TRUE, Condition
 from bbtc.ground.task import (
     Body,
@@ -127,6 +129,10 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
     }
     if action.changes:
         value["changes"] = [_change_to_json(change, task) for change in action.changes]
+    if action.duration is not None:
+        value["duration"] = duration_to_json(action.duration)
+    if action.timeout is not None:
+        value["timeout"] = given_text(action.timeout)
     return value
 
 
@@ -156,6 +162,8 @@ def _outcome_to_json(outcome: Outcome, variables: Sequence[Variable]) -> Json:
         value["cost"] = given_text(outcome.cost)
     if outcome.charges:
         value["charges"] = [_charge_to_json(charge, variables) for charge in outcome.charges]
+    if outcome.timed_out:
+        value["timed_out"] = True
     return value
 
 
@@ -192,8 +200,10 @@ def _template_to_json(template: GroundTemplate, variables: Sequence[Variable]) -
 
 def _body_to_json(body: Body, variables: Sequence[Variable]) -> Json:
     match body:
-        case BodyControl(kind, children):
-            return {"type": kind, "children": [_body_to_json(child, variables) for child in children]}
+        case BodyControl(kind, children, attempts):
+            counted = {} if attempts is None else {"attempts": attempts}
+            inner = [_body_to_json(child, variables) for child in children]
+            return {"type": kind, **counted, "children": inner}
         case BodyCondition(condition):
             return {"type": "condition", "condition": condition_to_json(condition, variables)}
         case BodyAction(action):
@@ -303,6 +313,10 @@ def read_task(at: At, faults: Faults) -> Task:
     return task
 
 
+_BODIES = (
+    *("sequence", "fallback", "skipper", "retry-until-success"),
+    *("condition", "action", "template"),
+)
 _TEMPLATE_FIELDS = ("name", "template", "args", "precondition", "body")
 _ZERO, _ONE = Fraction(0), Fraction(1)
 
@@ -344,6 +358,16 @@ def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
     expected = ground_name(symbol, args)
     if at.string() != expected:
         raise at.fault("BBT0604", f"the name must be '{clip(expected)}', not '{clip(at.string())}'")
+
+
+def _timeout(at: At) -> Fraction:
+    """Seconds after which an action is given up."""
+    seconds = at.given()
+    if not 0 < seconds <= LONGEST:
+        raise at.fault(
+            "BBT0604", "a time-out is above 0 seconds" if seconds <= 0 else "a time-out is too long"
+        )
+    return seconds
 
 
 def _signature(at: At) -> Signature:
@@ -444,7 +468,8 @@ class _Reader:
 
     def action(self, at: At) -> GroundAction:
         members = at.members(
-            ["name", "schema", "args", "cost", "precondition"], ["outcomes", "factors", "oneof", "changes"]
+            ["name", "schema", "args", "cost", "precondition"],
+            ["outcomes", "factors", "oneof", "changes", "duration", "timeout"],
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -455,6 +480,8 @@ class _Reader:
             self.chance(at, members),
             members["cost"].given(),
             tuple(self.change(each) for each in _optional(members, "changes")),
+            duration=duration_from_json(members["duration"]) if "duration" in members else None,
+            timeout=_timeout(members["timeout"]) if "timeout" in members else None,
         )
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
@@ -476,7 +503,7 @@ class _Reader:
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:
-        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges"])
+        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges", "timed_out"])
         if depth > MAX_NESTING:
             raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
         return Outcome(
@@ -486,6 +513,7 @@ class _Reader:
             members["reward"].given() if "reward" in members else _ZERO,
             members["cost"].given() if "cost" in members else _ZERO,
             tuple(self._charge(element) for element in _optional(members, "charges")),
+            "timed_out" in members and members["timed_out"].flag(),
         )
 
     def _charge(self, at: At) -> Charge:
@@ -514,8 +542,14 @@ class _Reader:
         )
 
     def _body(self, at: At, level: int) -> Body:
-        kind = kind_at(at, "sequence", "fallback", "skipper", "condition", "action", "template")
+        kind = kind_at(at, *_BODIES)
         match kind:
+            case "retry-until-success":
+                members = at.members(["type", "attempts", "children"])
+                tried = children_at(members["children"], level)
+                if len(tried) != 1:
+                    raise members["children"].fault("BBT0613", "what is tried again is one child")
+                return BodyControl(kind, (self._body(tried[0], level + 1),), members["attempts"].count())
             case "sequence" | "fallback" | "skipper":
                 children = children_at(at.members(["type", "children"])["children"], level)
                 return BodyControl(kind, tuple(self._body(child, level + 1) for child in children))

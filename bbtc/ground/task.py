@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
+from bbtc.durations import Duration
 from bbtc.ground.condition import Condition
 from bbtc.kleene import Truth
 from bbtc.source import Span
@@ -91,6 +92,8 @@ class Outcome:
     reward: Fraction = Fraction(0)
     cost: Fraction = Fraction(0)
     charges: tuple[Charge, ...] = ()
+    timed_out: bool = False
+    """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +201,11 @@ class GroundAction:
     """A schema with its arguments. One outcome of every factor happens, independently; all
     conditions are read before any effect. Where effects of one occurrence set a variable to
     different values, the Kleene maximum wins (delete before forget before add). ``changes`` tells what
-    happens to hidden facts, at most one a component, independently of each other and of the factors."""
+    happens to hidden facts, at most one a component, independently of each other and of the factors.
+
+    ``duration`` is how long it takes, drawn independently of the outcome (None: nobody says). After
+    ``timeout`` seconds it is given up: one factor then has an outcome ``timed_out``, unless that is
+    impossible, with the probability that it takes longer; the others are those of an action that does not."""
 
     schema: str
     args: tuple[str, ...]
@@ -207,6 +214,8 @@ class GroundAction:
     cost: Fraction = Fraction(1)
     changes: tuple[Change, ...] = ()
     span: Span | None = field(default=None, compare=False, repr=False)
+    duration: Duration | None = None
+    timeout: Fraction | None = None
 
     @property
     def name(self) -> str:
@@ -219,10 +228,11 @@ class GroundAction:
 
 @dataclass(frozen=True, slots=True)
 class BodyControl:
-    """A control node of a template body."""
+    """A control node of a template body; a retry-until-success has one child, and ``attempts``."""
 
-    kind: Literal["sequence", "fallback", "skipper"]
+    kind: Literal["sequence", "fallback", "skipper", "retry-until-success"]
     children: tuple[Body, ...]
+    attempts: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -376,7 +386,10 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     """Outcomes that do the same made one, with the sum of their probabilities."""
     merged: dict[tuple[object, ...], Outcome] = {}
     for outcome in outcomes:
-        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)
+        key = (
+            *(outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges),
+            outcome.timed_out,
+        )
         before = merged.get(key)
         if before is not None:
             total = before.probability + outcome.probability

@@ -12,6 +12,16 @@ from typing import Literal, TypeAlias
 
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
+from bbtc.syntax.declarations import Comment as Comment
+from bbtc.syntax.declarations import DomainReference as DomainReference
+from bbtc.syntax.declarations import Duration as Duration
+from bbtc.syntax.declarations import GoalNumber as GoalNumber
+from bbtc.syntax.declarations import Metric as Metric
+from bbtc.syntax.declarations import Observables as Observables
+from bbtc.syntax.declarations import PredicateDeclaration as PredicateDeclaration
+from bbtc.syntax.declarations import Predicates as Predicates
+from bbtc.syntax.declarations import Requirements as Requirements
+from bbtc.syntax.declarations import TypedSection as TypedSection
 from bbtc.syntax.terms import Arithmetic as Arithmetic
 from bbtc.syntax.terms import Atom as Atom
 from bbtc.syntax.terms import Empty as Empty
@@ -195,6 +205,15 @@ class BodyControl:
 
 
 @dataclass(frozen=True, slots=True)
+class BodyRetry:
+    """``(retry n child)``."""
+
+    attempts: Number
+    child: Body
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
 class BodyCondition:
     """``(condition formula)``."""
 
@@ -221,49 +240,10 @@ class BodyForeach:
     span: Span = span_field()
 
 
-Body: TypeAlias = BodyControl | BodyCondition | BodyCall | BodyForeach
+Body: TypeAlias = BodyControl | BodyRetry | BodyCondition | BodyCall | BodyForeach
 
 
 # --- sections --------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Requirements:
-    """``(:requirements :key…)``."""
-
-    keys: tuple[Name, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class TypedSection:
-    """``(:types …)``, ``(:constants …)``, ``(:objects …)``."""
-
-    kind: Literal["types", "constants", "objects"]
-    entries: TypedList
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class PredicateDeclaration:
-    """``(name params)`` within ``:predicates``; ``(unknown (name params))`` declares it three-valued,
-    ``(external …)`` around either of these as one that others change, ``(observed …)`` as one whose facts
-    are always seen."""
-
-    name: Name
-    parameters: TypedList
-    three_valued: bool
-    span: Span = span_field()
-    external: bool = False
-    observed: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Predicates:
-    """``(:predicates …)``."""
-
-    declarations: tuple[PredicateDeclaration, ...]
-    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +266,7 @@ class Functions:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """``(:action name :parameters … :precondition … :observe … :repeats :effect …)``."""
+    """``(:action name :parameters … :precondition … :observe … :repeats :effect … :duration …)``."""
 
     name: Name
     parameters: TypedList
@@ -295,6 +275,18 @@ class Action:
     effect: Effect | None
     span: Span = span_field()
     repeats: bool = False
+    timing: Timing | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """``:duration``, ``:timeout``, ``:timeout-probability``, ``:on-timeout`` of an action, where given."""
+
+    duration: Duration | None
+    timeout: NumericExpression | None
+    timeout_probability: Number | None
+    on_timeout: Effect | None
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -366,15 +358,6 @@ class DefaultSensing:
 
 
 @dataclass(frozen=True, slots=True)
-class Observables:
-    """``(:observables (name params)…)`` or ``(:observations …)``: predicates that stand for what is told."""
-
-    kind: Literal["observables", "observations"]
-    declarations: tuple[PredicateDeclaration, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
 class ObservationModel:
     """``(:observation name :parameters … :condition f :distribution e)``: after each action, where the
     condition holds, an observable is told as the distribution draws it."""
@@ -408,14 +391,6 @@ class Template:
     precondition: Formula | None
     effect: Effect | None
     body: Body
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class DomainReference:
-    """``(:domain name)``."""
-
-    name: Name
     span: Span = span_field()
 
 
@@ -519,24 +494,6 @@ class Goal:
     span: Span = span_field()
 
 
-@dataclass(frozen=True, slots=True)
-class GoalNumber:
-    """``(:goal-probability p)`` and ``(:goal-reward n)``."""
-
-    kind: Literal["goal-probability", "goal-reward"]
-    value: Number
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Metric:
-    """``(:metric minimize expression)``."""
-
-    direction: Literal["minimize", "maximize"]
-    expression: NumericExpression
-    span: Span = span_field()
-
-
 Section: TypeAlias = (
     Requirements
     | TypedSection
@@ -572,15 +529,6 @@ class Definition:
     kind: Literal["domain", "problem"]
     name: Name
     sections: tuple[Section, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Comment:
-    """``; text`` to the end of the line; ``own_line`` if nothing but space stands before it."""
-
-    text: str
-    own_line: bool
     span: Span = span_field()
 
 

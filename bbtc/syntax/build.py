@@ -30,6 +30,14 @@ _CONTROLS: Mapping[str, Literal["sequence", "fallback", "skipper"]]
 _CONTROLS = {"SEQUENCE": "sequence", "FALLBACK": "fallback", "SKIPPER": "skipper"}
 
 
+_DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[str, ...]]] = {
+    "uniform": ("uniform", ("least", "greatest")),
+    "triangular": ("triangular", ("least", "likeliest", "greatest")),
+    "lognormal": ("lognormal", ("median", "sigma")),
+}
+"""Distributions of durations, and what numbers they take."""
+
+
 class Types(NamedTuple):
     """``- type`` or ``- (either type…)`` behind names."""
 
@@ -78,6 +86,22 @@ class Distribution(Field[ast.Effect]):
 
 class Repeats(Field[bool]):
     """``:repeats``."""
+
+
+class Duration(Field[ast.Duration]):
+    """``:duration``."""
+
+
+class Timeout(Field[ast.NumericExpression]):
+    """``:timeout``."""
+
+
+class TimeoutProbability(Field[ast.Number]):
+    """``:timeout-probability``."""
+
+
+class OnTimeout(Field[ast.Effect]):
+    """``:on-timeout``."""
 
 
 class Body(Field[ast.Body]):
@@ -232,6 +256,7 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            _timing(fields, head.to(close)),
         )
 
     def template(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Template:
@@ -282,9 +307,44 @@ class Builder(Expressions):
     effect = Effect
     template_body = Body
     axiom_head = Implied
+    on_timeout = OnTimeout
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
+
+    def duration(self, keyword: Token, operand: Operand) -> Duration:
+        expression = _seconds(keyword, operand)
+        return Duration(keyword, ast.Duration("number", (expression,), (), expression.span))
+
+    def duration_drawn(self, field: Token, head: Token, operands: list[Operand], close: Token) -> Duration:
+        word = keyword(head)
+        kind, wanted = _DRAWN[word]
+        if len(operands) != len(wanted):
+            message = f"`{word}` takes {len(wanted)} numbers: `({word} {' '.join(wanted)})`"
+            raise Misuse("BBT0443", message, head.to(close))
+        amounts = tuple(_seconds(head, operand) for operand in operands)
+        return Duration(field, ast.Duration(kind, amounts, (), head.to(close)))
+
+    def duration_empirical(
+        self,
+        keyword: Token,
+        head: Token,
+        points: list[tuple[ast.NumericExpression, ast.Number]],
+        close: Token,
+    ) -> Duration:
+        amounts, weights = tuple(each for each, _ in points), tuple(weight for _, weight in points)
+        return Duration(keyword, ast.Duration("empirical", amounts, weights, head.to(close)))
+
+    def duration_point(
+        self, head: Token, operand: Operand, number: Token, _: Token
+    ) -> tuple[ast.NumericExpression, ast.Number]:
+        return _seconds(head, operand), self.number(number)
+
+    def timeout(self, keyword: Token, operand: Operand) -> Timeout:
+        return Timeout(keyword, _seconds(keyword, operand))
+
+    def timeout_probability(self, keyword: Token, number: Token) -> TimeoutProbability:
+        return TimeoutProbability(keyword, self.number(number))
 
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
         return Observe(keyword, _observed(formulas))
@@ -445,6 +505,9 @@ class Builder(Expressions):
     def body_control(self, head: Token, children: list[ast.Body], close: Token) -> ast.BodyControl:
         return ast.BodyControl(_CONTROLS[head.kind], tuple(children), head.to(close))
 
+    def body_retry(self, head: Token, number: Token, child: ast.Body, close: Token) -> ast.BodyRetry:
+        return ast.BodyRetry(self.number(number), child, head.to(close))
+
     def body_condition(self, head: Token, formula: ast.Formula, close: Token) -> ast.BodyCondition:
         return ast.BodyCondition(formula, head.to(close))
 
@@ -464,6 +527,26 @@ class Builder(Expressions):
 
     def unsupported_section(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
         return unsupported(keyword(head), head, close)
+
+
+def _timing(fields: _Fields, span: Span) -> ast.Timing | None:
+    duration, timeout = fields.get(Duration), fields.get(Timeout)
+    chance, effect = fields.get(TimeoutProbability), fields.get(OnTimeout)
+    given = any(each is not None for each in (duration, timeout, chance, effect))
+    return ast.Timing(duration, timeout, chance, effect, span) if given else None
+
+
+def _seconds(head: Token, operand: Operand) -> ast.NumericExpression:
+    """A number of seconds."""
+    expression = numeric(operand)
+    if expression is None:
+        span = operand.span if isinstance(operand, ast.Unsupported) else head.span
+        message, hint = (
+            "this is no number of seconds",
+            "a number, or a function that `:init` gives: `(time ?a ?b)`",
+        )
+        raise Misuse("BBT0101", message, span, hint)
+    return expression
 
 
 def _observed(formulas: list[ast.Formula]) -> ast.Observation:
