@@ -146,6 +146,8 @@ _CODES = (
     Code("BBT0444", "time-out that cannot be"),
     Code("BBT0445", "time-out beside hidden facts"),
     Code("BBT0446", "time that is not known"),
+    Code("BBT0447", "deadline that no run can meet"),
+    Code("BBT0448", "body that tries again for ever"),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

@@ -10,7 +10,8 @@ from bbtc import durations
 from bbtc.artefacts.cursor import At
 from bbtc.artefacts.numbers import given_text
 from bbtc.artefacts.prior_json import check_sum
-from bbtc.durations import Duration, Empirical, Fixed, LogNormal, Triangular, Uniform
+from bbtc.durations import LONGEST, Duration, Empirical, Fixed, LogNormal, Triangular, Uniform
+from bbtc.ground.task import Factor, outcomes_of
 
 
 def duration_to_json(duration: Duration) -> dict[str, object]:
@@ -65,3 +66,20 @@ def _numbers(at: At, count: int) -> list[Fraction]:
     if len(found) != count:
         raise at.fault("BBT0604", f"must be {count} numbers")
     return found
+
+
+def may_time_out(factors: tuple[Factor, ...], allowed: bool) -> bool:
+    """Do all outcomes of a time-out stand in one factor, not nested, of an action that has one?"""
+    inner = outcomes_of(inner for factor in factors for each in factor.outcomes for inner in each.factors)
+    late = [factor for factor in factors if any(each.timed_out for each in factor.outcomes)]
+    return len(late) <= int(allowed) and not any(each.timed_out for each in inner)
+
+
+def timeout_from_json(at: At) -> Fraction:
+    """Seconds after which an action is given up."""
+    seconds = at.given()
+    if not 0 < seconds <= LONGEST:
+        raise at.fault(
+            "BBT0604", "a time-out is above 0 seconds" if seconds <= 0 else "a time-out is too long"
+        )
+    return seconds

@@ -16,13 +16,17 @@ from typing_extensions import assert_never
 
 from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of, variable_from_json
 from bbtc.artefacts.cursor import At, Faults, clip, run_reader
-from bbtc.artefacts.duration_json import duration_from_json, duration_to_json
+from bbtc.artefacts.duration_json import (
+    duration_from_json,
+    duration_to_json,
+    may_time_out,
+    timeout_from_json,
+)
 from bbtc.artefacts.hidden_json import component_to_json, observation_to_json, true_world, true_world_to_json
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
 from bbtc.artefacts.prior_json import check_sum, prior_from_json
 from bbtc.diagnostics import BbtcError, Diagnostic
-from bbtc.durations import LONGEST
 from bbtc.ground.condition import TRUE, Condition
 from bbtc.ground.task import (
     Body,
@@ -360,16 +364,6 @@ def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
         raise at.fault("BBT0604", f"the name must be '{clip(expected)}', not '{clip(at.string())}'")
 
 
-def _timeout(at: At) -> Fraction:
-    """Seconds after which an action is given up."""
-    seconds = at.given()
-    if not 0 < seconds <= LONGEST:
-        raise at.fault(
-            "BBT0604", "a time-out is above 0 seconds" if seconds <= 0 else "a time-out is too long"
-        )
-    return seconds
-
-
 def _signature(at: At) -> Signature:
     members = at.members(["kind", "symbol", "parameters"])
     kind: Literal["predicate", "action"] = (
@@ -473,15 +467,19 @@ class _Reader:
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
+        factors = self.chance(at, members)
+        if not may_time_out(factors, "timeout" in members):
+            message = "outcomes of a time-out belong into one distribution of an action that has one"
+            raise at.fault("BBT0604", message)
         return GroundAction(
             schema,
             args,
             self.condition(members["precondition"]),
-            self.chance(at, members),
+            factors,
             members["cost"].given(),
             tuple(self.change(each) for each in _optional(members, "changes")),
             duration=duration_from_json(members["duration"]) if "duration" in members else None,
-            timeout=_timeout(members["timeout"]) if "timeout" in members else None,
+            timeout=timeout_from_json(members["timeout"]) if "timeout" in members else None,
         )
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:

@@ -7,13 +7,14 @@ whether that is so decides both about its outcome and about its time.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
 from bbtc import durations
 from bbtc.belief.chain import Chain
+from bbtc.belief.draws import Values
 from bbtc.belief.state import Transition, compile_action
 from bbtc.durations import INSTANT, Bounds, Duration
 from bbtc.ground.task import ONE, Factor, GroundAction, Task
@@ -63,7 +64,7 @@ def happenings(task: Task, chain: Chain, limits: Limits) -> tuple[tuple[Happenin
     :class:`Untimed`, and :class:`bbtc.diagnostics.LimitReached`."""
     if chain.given_up:
         raise Untimed("an action is given up by the tick after the one that starts it")
-    doings: dict[str, _Doing] = {}
+    doings: dict[str, Doing] = {}
     found: list[tuple[Happening, ...]] = []
     for state, action in enumerate(chain.action):
         if action < 0:
@@ -73,8 +74,8 @@ def happenings(task: Task, chain: Chain, limits: Limits) -> tuple[tuple[Happenin
             limits.check_time("adding up durations")
         name = chain.actions[action].action
         if name not in doings:
-            doings[name] = _Doing(task, task.action_by_name[name], limits)
-        found.append(tuple(doings[name].happenings(chain, state)))
+            doings[name] = Doing(task, task.action_by_name[name], limits)
+        found.append(doings[name].happenings(chain, state))
     return tuple(found)
 
 
@@ -88,45 +89,44 @@ class _Way:
     transition: Transition
 
 
-class _Doing:
-    """An action, divided by whether it is given up."""
+class Doing:
+    """An action in time, divided by whether it is given up."""
 
     def __init__(self, task: Task, action: GroundAction, limits: Limits) -> None:
-        self._duration = action.duration or INSTANT
-        self._ways: list[_Way] = []
         given_up = chance_given_up(action)
         if not given_up:
+            whole = compile_action(task, action, limits)
+            self._ways = [_Way(ONE, action.duration or INSTANT, None, whole)]
             return
         if action.duration is None:
             raise Untimed(f"{action.name} does not say how long it takes where its time-out does not pass")
         assert action.timeout is not None
         late = compile_action(task, _only(action, timed_out=True), limits)
-        self._ways.append(_Way(given_up, durations.Fixed(action.timeout), None, late))
+        self._ways = [_Way(given_up, durations.Fixed(action.timeout), None, late)]
         if given_up < 1:
             usual = compile_action(task, _only(action, timed_out=False), limits)
             self._ways.append(_Way(1 - given_up, action.duration, action.timeout, usual))
 
-    def happenings(self, chain: Chain, state: int) -> list[Happening]:
-        """The ways in which it takes time in a state that starts it."""
-        edges = chain.edges[state]
-        if not self._ways:
-            moves = distribution((edge.successor, edge.result.probability) for edge in edges)
-            return [Happening(ONE, self._duration, None, tuple(moves.items()))]
-        successor = {edge.result.values: edge.successor for edge in edges}
-        values = chain.states[state].values
-        return [
+    def happenings(self, chain: Chain, state: int) -> tuple[Happening, ...]:
+        """The ways in which it takes time in a state of a chain that starts it."""
+        successor = {edge.result.values: edge.successor for edge in chain.edges[state]}
+        return self.ways_from(chain.states[state].values, successor)
+
+    def ways_from(self, values: Values, number: Mapping[Values, int]) -> tuple[Happening, ...]:
+        """The ways in which it takes time in a state with these values; what it leads to is numbered."""
+        return tuple(
             Happening(
                 way.chance,
                 way.duration,
                 way.at_most,
                 tuple(
                     distribution(
-                        (successor[result.values], result.probability) for result in way.transition(values)
+                        (number[result.values], result.probability) for result in way.transition(values)
                     ).items()
                 ),
             )
             for way in self._ways
-        ]
+        )
 
 
 def chance_given_up(action: GroundAction) -> Fraction:
