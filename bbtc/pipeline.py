@@ -432,7 +432,7 @@ def plan_task(
     from bbtc.belief.rerolled import rerolled
     from bbtc.planner.best_tree import BestTree
     from bbtc.planner.bounds import judged, unjudged
-    from bbtc.planner.checked import checked
+    from bbtc.planner.finish import checked
     from bbtc.planner.guard import guarded
     from bbtc.planner.options import DEFAULTS
     from bbtc.planner.strategies import run_strategy

@@ -36,15 +36,17 @@ class WithinTime:
         search_ends: Callable[[], None],
     ) -> Plan:
         """As :func:`bbtc.pipeline.plan_task`, for the deadline."""
-        from bbtc.deadlines import plan_by
+        from bbtc.pipeline import plan_task
+        from bbtc.planner.deadline.plan import plan_by
 
         found = plan_by(
             task,
             self.seconds,
+            plan_task,
             target,
-            strategy,
             limits,
-            progress,
+            strategy=strategy,
+            progress=progress,
             options=options,
             search_begins=search_begins,
             search_ends=search_ends,

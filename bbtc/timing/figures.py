@@ -11,11 +11,13 @@ from math import gcd, lcm
 from bbtc import durations
 from bbtc.belief.absorption import Absorption
 from bbtc.belief.chain import Chain
+from bbtc.diagnostics import BbtcError
 from bbtc.durations import Bounds
 from bbtc.ground.task import ZERO, Task
 from bbtc.limits import Limits
 from bbtc.timing.chain import Happening, Untimed, happenings, timed, untimed_actions
 from bbtc.timing.curve import Curve, curves
+from bbtc.tree.nodes import SuccessBy
 
 SHARES = (Fraction(1, 2), Fraction(9, 10), Fraction(95, 100), Fraction(99, 100))
 """Of the runs that succeed: by when so many of them have."""
@@ -78,11 +80,23 @@ def times(
     return Times(figures, None, ways)
 
 
-def success_by(task: Task, chain: Chain, seconds: Fraction, limits: Limits) -> tuple[float, float]:
-    """Bounds of the probability that a tree succeeds within so many seconds. Raises :class:`Untimed`."""
-    ways = happenings(task, chain, limits)
+def success_by(task: Task, chain: Chain, seconds: Fraction, limits: Limits) -> SuccessBy:
+    """Bounds of the probability that a tree succeeds within so many seconds. Raises :class:`BbtcError`
+    where it is not known how long actions take, and :class:`bbtc.diagnostics.LimitReached`."""
+    if not timed(task):
+        raise unknown("no action has a `:duration`")
+    try:
+        ways = happenings(task, chain, limits)
+    except Untimed as reason:
+        raise unknown(str(reason)) from None
     step = whole_step(ways, seconds)
-    return curves(chain, ways, step, int(seconds / step), limits).by(seconds)
+    least, most = curves(chain, ways, step, int(seconds / step), limits).by(seconds)
+    return SuccessBy(seconds, Fraction(least), Fraction(most))
+
+
+def unknown(why: str) -> BbtcError:
+    """An error: success by a deadline is asked for, and the time of actions is not known."""
+    return BbtcError.single("BBT0446", f"success by a deadline cannot be told: {why}")
 
 
 def whole_step(ways: Sequence[Sequence[Happening]], seconds: Fraction, steps: int = 600) -> Fraction:

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 import bbtc
-from bbtc import deadlines
+from bbtc import pipeline
 from bbtc.artefacts import load_tree, tree_to_json
 from bbtc.artefacts.jsontext import dumps
 from bbtc.limits import Limits
+from bbtc.planner.deadline import plan as deadlines
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.source import SourceFile
@@ -49,10 +50,11 @@ def planned(text: str, seconds: int) -> deadlines.DeadlinePlan:
     return deadlines.plan_by(
         task,
         F(seconds),
+        pipeline.plan_task,
         None,
-        "auto",
         Limits(seconds=60),
-        lambda _: None,
+        strategy="auto",
+        progress=lambda _: None,
         options=Options(),
     )
 

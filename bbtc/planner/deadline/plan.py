@@ -14,22 +14,21 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import TypeAlias
 
 import numpy as np
 
 from bbtc import durations
-from bbtc.belief.chain import Chain, explore
+from bbtc.belief.chain import explore
 from bbtc.belief.simulate import figures, success_of
 from bbtc.diagnostics import BbtcError, LimitReached
 from bbtc.ground.task import Factor, GroundAction, Task
 from bbtc.limits import Limits
-from bbtc.pipeline import plan_task
 from bbtc.planner.best_tree import BestTree
-from bbtc.planner.checked import checked
 from bbtc.planner.deadline.induction import induction
 from bbtc.planner.deadline.process import TimedProcess, timed_process
 from bbtc.planner.deadline.stationary import stationary
-from bbtc.planner.finish import finish
+from bbtc.planner.finish import checked, finish
 from bbtc.planner.guard import guarded
 from bbtc.planner.options import Options, Prefer
 from bbtc.planner.result import Plan, Progress, Refinement
@@ -38,10 +37,11 @@ from bbtc.planner.synthesis.tree import synthesize
 from bbtc.rewrite.simplify import size
 from bbtc.rounding import decimal
 from bbtc.timing.chain import Untimed, timed
-from bbtc.timing.figures import success_by, whole_step
+from bbtc.timing.figures import success_by, unknown, whole_step
 from bbtc.tree.nodes import PlanStatus, SuccessBy
 
 _SHARE = 0.3  # of the time, for planning as ever, and each of the others
+Planner: TypeAlias = Callable[..., Plan]
 _STEPS = 300  # of time, up to the deadline
 
 
@@ -60,29 +60,29 @@ class DeadlinePlan:
         return self.plan.tree.success_by
 
 
-def plan_by(  # noqa: PLR0917 - those of `plan_task`, and one more
+def plan_by(
     task: Task,
     seconds: Fraction,
+    planner: Planner,
     target: Fraction | None,
-    strategy: str,
     limits: Limits,
-    progress: Progress,
     *,
+    strategy: str,
+    progress: Progress,
     options: Options,
     search_begins: Callable[[], None] = lambda: None,
     search_ends: Callable[[], None] = lambda: None,
 ) -> DeadlinePlan:
-    """Plan for success within so many seconds; the other arguments are those of
-    :func:`bbtc.pipeline.plan_task`. Raises as that does, and :class:`BbtcError` where it is not known how
-    long actions take, and where no run can be done in time."""
+    """Plan for success within so many seconds. The planner is :func:`bbtc.pipeline.plan_task`, and the other
+    arguments are its own. Raises as that does, and :class:`BbtcError` where it is not known how long actions
+    take, and where no run can be done in time."""
     if not timed(task):
-        raise _unknown("no action of the task has a `:duration`")
+        raise unknown("no action of the task has a `:duration`")
     wanted = task.goal_probability if target is None else target
-    first = plan_task(
-        task, target, strategy, limits.part(_SHARE), progress, options=options, search_begins=search_begins
-    )
+    part = limits.part(_SHARE)
+    first = planner(task, target, strategy, part, progress, options=options, search_begins=search_begins)
     best = judged(first, seconds, limits)
-    search = _Search(task, seconds, limits, options)
+    search = _Search(task, seconds, planner, limits, options)
     stop = first.stop
     try:
         for plan in search.plans(target, strategy):
@@ -112,21 +112,7 @@ def judged(plan: Plan, seconds: Fraction, limits: Limits) -> Plan:
     """The plan with what its tree claims of a deadline. Raises :class:`BbtcError` where that is not known."""
     tree = plan.tree
     chain = explore(tree.task, tree.root, Limits(states=limits.states))
-    return replace(plan, tree=replace(tree, success_by=claim(tree.task, chain, seconds, limits)))
-
-
-def claim(task: Task, chain: Chain, seconds: Fraction, limits: Limits) -> SuccessBy:
-    """Bounds of the probability of success within so many seconds. Raises :class:`BbtcError` where it is not
-    known how long actions take."""
-    try:
-        least, most = success_by(task, chain, seconds, limits)
-    except Untimed as reason:
-        raise _unknown(str(reason)) from None
-    return SuccessBy(seconds, Fraction(least), Fraction(most))
-
-
-def _unknown(why: str) -> BbtcError:
-    return BbtcError.single("BBT0446", f"success by a deadline cannot be told: {why}")
+    return replace(plan, tree=replace(tree, success_by=success_by(tree.task, chain, seconds, limits)))
 
 
 def _by(plan: Plan) -> SuccessBy:
@@ -144,6 +130,7 @@ class _Search:
 
     task: Task
     seconds: Fraction
+    planner: Planner
     limits: Limits
     options: Options
     most: Fraction | None = None
@@ -156,7 +143,8 @@ class _Search:
         for task, prefer in preferences:
             options = replace(self.options, prefer=prefer)
             with suppress(LimitReached):
-                plan = plan_task(task, target, strategy, self.limits.part(_SHARE), _quiet, options=options)
+                part = self.limits.part(_SHARE)
+                plan = self.planner(task, target, strategy, part, _quiet, options=options)
                 yield self._of_task(plan)
         if process is not None:
             yield from self._by_induction(process)
