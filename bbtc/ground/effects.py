@@ -69,9 +69,9 @@ class _Part:
             self.charges[guard] = both
 
     def draw(self, factors: Iterable[Factor]) -> None:
-        """Draw further factors; what is certain of them is no draw (rule 7)."""
+        """Draw further factors; what is certain of them is no draw (rule 7), unless it is a time-out."""
         for factor in factors:
-            if len(factor.outcomes) > 1:
+            if len(factor.outcomes) > 1 or factor.outcomes[0].timed_out:
                 self.factors.append(factor)
             else:
                 _absorb(self, factor.outcomes[0])

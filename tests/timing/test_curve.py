@@ -300,6 +300,22 @@ def test_a_time_out_cuts_the_time_and_the_outcome_together() -> None:
     assert found.curve.step == 2
 
 
+def test_an_action_that_always_takes_longer_is_always_given_up() -> None:
+    written = text(":duration (uniform 12 14) :timeout 10 :on-timeout (probabilistic 0.5 (done))", "1")
+    tree = planned(written)
+    assert tree is not None
+    found = times(tree).figures
+    assert found is not None
+    assert found.expected == (F(20), F(20))
+    (factor,) = tree.task.actions[0].factors
+    assert all(outcome.timed_out for outcome in factor.outcomes)
+    certain = planned(written.replace("(probabilistic 0.5 (done))", "(done)"))
+    assert certain is not None
+    found = times(certain).figures
+    assert found is not None
+    assert found.expected == (F(10), F(10))
+
+
 def test_without_a_duration_nothing_is_told_of_time() -> None:
     assert times_or_none(text("")) is None
     untold = of(":timeout 10 :timeout-probability 0.25")
