@@ -87,7 +87,7 @@ def _unread(known: Known) -> Iterator[tuple[md.Predicate, bool]]:
     for schema in model.schemas.values():
         read |= facts.observed(schema)
     read |= {atom.predicate for asked in model.thresholds.values() for atom in mf.atoms(asked.condition)}
-    written = {leaf.predicate for schema in model.schemas.values() for leaf in me.settings(schema.effect)}
+    written = {leaf.predicate for schema in model.schemas.values() for leaf in me.settings(schema.effects)}
     written |= {rule.predicate for rule in model.rules}
     for name, predicate in model.predicates.items():
         if name not in read and name not in model.symbols:
@@ -140,7 +140,7 @@ def _set_to(model: md.Model, *, unknown: bool) -> set[str]:
     return {
         leaf.predicate
         for schema in model.schemas.values()
-        for leaf in me.settings(schema.effect)
+        for leaf in me.settings(schema.effects)
         if (leaf.value is Truth.UNKNOWN) is unknown
     }
 
@@ -158,7 +158,7 @@ def _untold(known: Known, lost: Collection[str]) -> Iterator[mf.Reading]:
         # What a draw, a condition of the start or an effect joins may be told by each other.
         told |= {leaf.predicate for choice in model.init.choices for leaf in me.settings(choice)}
         told |= {atom.predicate for clause in model.init.clauses for atom in mf.atoms(clause.condition)}
-        guards = (guard for schema in model.schemas.values() for guard in me.conditions(schema.effect))
+        guards = (guard for schema in model.schemas.values() for guard in me.conditions(schema.effects))
         told |= {atom.predicate for guard in guards for atom in mf.atoms(guard)}
     for reading in known.readings:
         predicate = model.predicates[reading.atom.predicate]
@@ -231,6 +231,21 @@ def _only_others(known: Known) -> Iterator[Diagnostic]:
             yield _about_reading("BBT0313", message, reading, hint, known)
 
 
+def _only_events(known: Known) -> Iterator[Diagnostic]:
+    model = known.model
+    actions = (schema for schema in model.schemas.values() if schema.exogenous is None)
+    told = {leaf.predicate for schema in actions for leaf in me.settings(schema.effects)}
+    by_itself = {leaf.predicate for event in model.events for leaf in me.settings(event.effects)}
+    events = {id(each) for event in model.events for each in facts.schema_conditions(event)}
+    for condition in known.conditions:
+        for reading in mf.readings(condition) if id(condition) not in events else ():
+            name = reading.atom.predicate
+            if name in by_itself and name not in told:
+                told.add(name)
+                message, hint = f"only events change `{name}`", "the robot can wait for it, and nothing else"
+                yield _about_reading("BBT0317", message, reading, hint, known)
+
+
 # --- actions ---------------------------------------------------------------------------------
 
 
@@ -259,6 +274,7 @@ def _impossible(formula: mf.Formula, reached: facts.Reached) -> mf.Formula | Non
 def _contradictions(known: Known) -> Iterator[Diagnostic]:
     for schema in known.model.schemas.values():
         yield from _contradictions_in(schema.effect, {})
+        yield from _contradictions_in(schema.on_abort, {})
 
 
 def _contradictions_in(
@@ -308,8 +324,10 @@ def _duplicates(known: Known) -> Iterator[Diagnostic]:
 
 
 def _without_effect(known: Known) -> Iterator[Diagnostic]:
+    if known.model.events:
+        return  # it waits for what happens by itself
     for name, schema in known.model.schemas.items():
-        if not schema.tells and next(me.settings(schema.effect), None) is None:
+        if not schema.tells and next(me.settings(schema.effects), None) is None:
             yield Diagnostic("BBT0306", f"action `{name}` changes nothing", schema.span)
 
 
@@ -319,7 +337,7 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
     actions = known.relevant
     possible = known.reached.actions
     for name, schema in known.model.schemas.items():
-        changes = next(me.settings(schema.effect), None) is not None
+        changes = next(me.settings(schema.effects), None) is not None
         if name not in actions and name in possible and changes:
             yield Diagnostic(
                 "BBT0307",
@@ -334,7 +352,7 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
 
 def _probabilities(known: Known) -> Iterator[Diagnostic]:
     for schema in known.model.schemas.values():
-        for part in me.walk(schema.effect):
+        for part in me.walk(schema.effects):
             if isinstance(part, me.Choice) and part.timeout is None:
                 yield from _doubtful(part)
 
@@ -380,11 +398,19 @@ def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
 def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
     """Whether renaming the parameter changes the action."""
     renamed = _renamed(schema, {parameter.name: other.name})
-    return renamed != (schema.precondition, schema.effect, schema.observe, schema.told, schema.duration)
+    whole = (
+        schema.precondition,
+        schema.effect,
+        schema.observe,
+        schema.told,
+        schema.on_abort,
+        schema.duration,
+    )
+    return renamed != whole
 
 
 def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, ...]:
-    """Precondition, effect, observations and duration with other parameters."""
+    """Precondition (``:while`` among it), effects, observations and duration with other parameters."""
     free, observed = dict(binding), schema.observe
     told: object = None
     if isinstance(observed, me.Choice):
@@ -395,9 +421,9 @@ def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object,
         replace(each, condition=mf.substitute(each.condition, free), when=mf.substitute(each.when, free))
         for each in schema.told
     )
+    effect, abort = me.substitute(schema.effect, free), me.substitute(schema.on_abort, free)
     duration = me.substitute_duration(schema.duration, free)
-    effect = me.substitute(schema.effect, free)
-    return mf.substitute(schema.precondition, free), effect, told, besides, duration
+    return mf.substitute(schema.precondition, free), effect, told, besides, abort, duration
 
 
 def _unused_templates(known: Known) -> Iterator[Diagnostic]:
@@ -422,6 +448,7 @@ CHECKS = (
     Check("BBT0304", _lost_knowledge),
     Check("BBT0304", _hopeless_conditions, needs_problem=True),
     Check("BBT0313", _only_others, needs_problem=True),
+    Check("BBT0317", _only_events),
     Check("BBT0305", _duplicates),
     Check("BBT0306", _without_effect),
     Check("BBT0307", _irrelevant_actions, needs_problem=True),

@@ -6,28 +6,34 @@ tool must read stays small.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of, variable_from_json
-from bbtc.artefacts.cursor import At, Faults, clip, run_reader
+from bbtc.artefacts.conditions import condition_to_json, number_of
+from bbtc.artefacts.cursor import At, Faults, check_distinct, clip, optional, run_reader
 from bbtc.artefacts.duration_json import (
     duration_from_json,
     duration_to_json,
     may_time_out,
     timeout_from_json,
 )
-from bbtc.artefacts.hidden_json import component_to_json, observation_to_json, true_world, true_world_to_json
+from bbtc.artefacts.hidden_json import (
+    HiddenReader,
+    component_to_json,
+    observation_to_json,
+    true_world,
+    true_world_to_json,
+)
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
-from bbtc.artefacts.prior_json import check_sum, prior_from_json
+from bbtc.artefacts.prior_json import check_sum
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
+from bbtc.ground.events import clashes
 from bbtc.ground.task import (
     Body,
     BodyAction,
@@ -36,14 +42,12 @@ from bbtc.ground.task import (
     BodyTemplate,
     Change,
     Charge,
-    Component,
     Effect,
     Factor,
     GroundAction,
+    GroundEvent,
     GroundTemplate,
     InitialState,
-    Knowledge,
-    Observation,
     Outcome,
     Signature,
     Task,
@@ -52,6 +56,7 @@ from bbtc.ground.task import (
     split_name,
 )
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.source import SourceFile
 from bbtc.tree.validate import MAX_DEPTH, active_templates, body_problems
 
@@ -95,6 +100,8 @@ def task_to_json(task: Task) -> Json:
     if task.origin is not None:
         value["origin"] = task_to_json(task.origin)
     value["actions"] = [_action_to_json(action, task) for action in task.actions]
+    if task.events:
+        value["events"] = [_event_to_json(event, task.variables) for event in task.events]
     if task.templates:
         value["templates"] = [_template_to_json(template, task.variables) for template in task.templates]
     if task.signatures:
@@ -137,7 +144,22 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
         value["duration"] = duration_to_json(action.duration)
     if action.timeout is not None:
         value["timeout"] = given_text(action.timeout)
+    if action.during is not None:
+        value["while"] = condition_to_json(action.during, task.variables)
+    if action.on_abort:
+        value["on_abort"] = _chance_to_json(action.on_abort, task.variables)
     return value
+
+
+def _event_to_json(event: GroundEvent, variables: Sequence[Variable]) -> Json:
+    value: Json = {
+        "name": event.name,
+        "schema": event.schema,
+        "args": list(event.args),
+        "precondition": condition_to_json(event.precondition, variables),
+        **_chance_to_json(event.factors, variables),
+    }
+    return value | ({"round": event.round} if event.round else {})
 
 
 def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
@@ -264,14 +286,15 @@ def read_task(at: At, faults: Faults) -> Task:
             "components",
             "origin",
             "true_worlds",
+            "events",
         ],
     )
     variables = faults.each(members["variables"].elements(), _variable)
     faults.stop_if_any()  # every mention of a variable would be a fault of its own
     variables.sort(key=lambda variable: variable.name)
-    _check_distinct(members["variables"], [variable.name for variable in variables])
+    check_distinct(members["variables"], [variable.name for variable in variables])
     reader = _Reader.of(variables)
-    components = tuple(faults.each(_optional(members, "components"), reader.component))
+    components = tuple(faults.each(optional(members, "components"), reader.component))
     faults.stop_if_any()  # changes name them by number
     reader = replace(reader, components=components)
     actions = faults.each(members["actions"].elements(), reader.action)
@@ -285,7 +308,7 @@ def read_task(at: At, faults: Faults) -> Task:
         goal=faults.attempt(lambda: reader.condition(members["goal"]), no_goal),
         actions=tuple(sorted(actions, key=lambda action: action.name)),
         templates=tuple(
-            sorted(faults.each(_optional(members, "templates"), reader.template), key=lambda t: t.name)
+            sorted(faults.each(optional(members, "templates"), reader.template), key=lambda t: t.name)
         ),
         goal_probability=faults.attempt(
             lambda: (
@@ -298,23 +321,37 @@ def read_task(at: At, faults: Faults) -> Task:
         ),
         metric=faults.attempt(lambda: _metric(members), "cost"),
         signatures=tuple(
-            sorted(
-                faults.each(_optional(members, "signatures"), _signature), key=lambda s: (s.kind, s.symbol)
-            )
+            sorted(faults.each(optional(members, "signatures"), _signature), key=lambda s: (s.kind, s.symbol))
         ),
         components=components,
         origin=origin,
         true_worlds=(
-            tuple(faults.each(_optional(members, "true_worlds"), true_world))
+            tuple(faults.each(optional(members, "true_worlds"), true_world))
             if origin is None
             else origin.true_worlds
+        ),
+        events=tuple(
+            sorted(faults.each(optional(members, "events"), reader.event), key=lambda e: (e.round, e.name))
         ),
     )
     faults.stop_if_any()
     check_sum(members["initial"], [state.probability for state in task.initial])
-    _check_distinct(members["actions"], [action.name for action in task.actions])
+    check_distinct(members["actions"], [action.name for action in task.actions])
+    _check_events(members, task)
     _check_templates(members, task, faults)
     return task
+
+
+def _check_events(members: Mapping[str, At], task: Task) -> None:
+    """Raise a fault for events that contradict each other, or stand beside hidden facts."""
+    if not task.events:
+        return
+    names = [each.name for each in task.occurrences]
+    check_distinct(members["events"], sorted(names))
+    if task.components:
+        raise members["events"].fault("BBT0604", "events beside hidden facts are not supported")
+    for finding in clashes(task.events, task.variables, Limits()):
+        raise members["events"].fault("BBT0604", finding.message)
 
 
 _BODIES = (
@@ -325,21 +362,10 @@ _TEMPLATE_FIELDS = ("name", "template", "args", "precondition", "body")
 _ZERO, _ONE = Fraction(0), Fraction(1)
 
 
-def _optional(members: Mapping[str, At], name: str) -> list[At]:
-    return members[name].elements() if name in members else []
-
-
 def _metric(members: Mapping[str, At]) -> Literal["cost", "reward"]:
     return (
         "reward" if "metric" in members and members["metric"].word("cost", "reward") == "reward" else "cost"
     )
-
-
-def _check_distinct(at: At, names: Sequence[str]) -> None:
-    """Raise a fault if two neighbours of a sorted list of names are equal."""
-    for name, following in itertools.pairwise(names):
-        if name == following:
-            raise at.fault("BBT0607", f"'{clip(name)}' stands twice")
 
 
 def _variable(at: At) -> Variable:
@@ -373,73 +399,8 @@ def _signature(at: At) -> Signature:
 
 
 @dataclass(frozen=True, slots=True)
-class _Reader:
+class _Reader(HiddenReader):
     """Reads what refers to the variables of a task."""
-
-    variables: tuple[Variable, ...]
-    index: Mapping[str, int]
-    components: tuple[Component, ...] = ()
-
-    @classmethod
-    def of(cls, variables: Iterable[Variable]) -> _Reader:
-        """For some variables."""
-        listed = tuple(variables)
-        return cls(listed, {variable.name: number for number, variable in enumerate(listed)})
-
-    def component(self, at: At) -> Component:
-        members = at.members(["facts", "prior", "known"], ["seen", "first"])
-        facts, seen = members["facts"].strings(), self._seen(members)
-        _check_distinct(members["facts"], sorted(facts))
-        local = self._local(facts, seen)
-        prior, diagram = prior_from_json(members["prior"], {fact: at for at, fact in enumerate(facts)})
-        known = sorted(
-            (self._knowledge(each, local) for each in members["known"].elements()),
-            key=lambda each: each.variable,
-        )
-        first = tuple(local.observation(each) for each in _optional(members, "first"))
-        return Component(facts, prior, tuple(known), first, seen, diagram)
-
-    def _knowledge(self, at: At, local: _Reader) -> Knowledge:
-        members = at.members(["variable", "condition"], ["at_least"])
-        variable = variable_from_json(members["variable"], self.index)
-        if not self.variables[variable].three_valued:
-            name = clip(self.variables[variable].name)
-            raise members["variable"].fault("BBT0604", f"variable '{name}' cannot be unknown")
-        at_least = members["at_least"].given_probability() if "at_least" in members else _ONE
-        if 2 * at_least <= 1:
-            raise members["at_least"].fault("BBT0604", "must be above 1/2, for one side to be believed")
-        return Knowledge(variable, local.condition(members["condition"]), at_least)
-
-    def _seen(self, members: Mapping[str, At]) -> tuple[int, ...]:
-        return tuple(variable_from_json(each, self.index) for each in _optional(members, "seen"))
-
-    def _local(self, facts: Sequence[str], seen: Sequence[int]) -> _Reader:
-        """Reads what refers to the local variables of a component."""
-        hidden = (Variable(*split_name(fact), three_valued=False, hidden=True) for fact in facts)
-        return _Reader.of((*hidden, *(self.variables[variable] for variable in seen)))
-
-    def observation(self, at: At) -> Observation:
-        members = at.members(["condition"], ["when", "accuracy", "accuracy_false"])
-        return Observation(
-            self.condition(members["condition"]),
-            members["accuracy"].given_probability() if "accuracy" in members else _ONE,
-            self.condition(members["when"]) if "when" in members else None,
-            members["accuracy_false"].given_probability() if "accuracy_false" in members else None,
-        )
-
-    def change(self, at: At) -> Change:
-        members = at.members(["component"], ["seen", "outcomes", "factors", "oneof", "observations"])
-        number = members["component"].value
-        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(self.components):
-            message = f"must be the number of a component, below {len(self.components)}"
-            raise members["component"].fault("BBT0604", message)
-        seen = self._seen(members)
-        local = self._local(self.components[number].facts, seen)
-        observations = tuple(local.observation(each) for each in _optional(members, "observations"))
-        return Change(number, seen, local.chance(at, members), observations)
-
-    def condition(self, at: At) -> Condition:
-        return condition_from_json(at, self.index)
 
     def initial_state(self, at: At) -> InitialState:
         members = at.members(["p", "assign"])
@@ -463,7 +424,7 @@ class _Reader:
     def action(self, at: At) -> GroundAction:
         members = at.members(
             ["name", "schema", "args", "cost", "precondition"],
-            ["outcomes", "factors", "oneof", "changes", "duration", "timeout"],
+            ["outcomes", "factors", "oneof", "changes", "while", "on_abort", "duration", "timeout"],
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -477,10 +438,27 @@ class _Reader:
             self.condition(members["precondition"]),
             factors,
             members["cost"].given(),
-            tuple(self.change(each) for each in _optional(members, "changes")),
+            tuple(self.change(each) for each in optional(members, "changes")),
+            during=self.condition(members["while"]) if "while" in members else None,
+            on_abort=self._abort(members["on_abort"]) if "on_abort" in members else (),
             duration=duration_from_json(members["duration"]) if "duration" in members else None,
             timeout=timeout_from_json(members["timeout"]) if "timeout" in members else None,
         )
+
+    def _abort(self, at: At) -> tuple[Factor, ...]:
+        return self.chance(at, at.members([], ["outcomes", "factors", "oneof"]))
+
+    def event(self, at: At) -> GroundEvent:
+        members = at.members(
+            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round"]
+        )
+        schema, args = members["schema"].string(), members["args"].strings()
+        _check_name(members["name"], schema, args)
+        number = members["round"].value if "round" in members else 0
+        if isinstance(number, bool) or not isinstance(number, int) or number < 0:
+            raise members["round"].fault("BBT0604", "must be the number of a round, from 0 on")
+        factors = self.chance(at, members)
+        return GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
         """The factors of an object with either ``outcomes`` or ``factors``."""
@@ -488,7 +466,7 @@ class _Reader:
             raise at.fault("BBT0603", "either 'outcomes' or 'factors' must be there, not both")
         lists = members["factors"].elements() if "factors" in members else [members["outcomes"]]
         unknown: set[int] = set()
-        for element in _optional(members, "oneof"):
+        for element in optional(members, "oneof"):
             number = element.value
             if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(lists):
                 raise element.fault("BBT0604", f"must be the number of a factor, below {len(lists)}")
@@ -510,7 +488,7 @@ class _Reader:
             self.chance(at, members, depth + 1) if "factors" in members or "oneof" in members else (),
             members["reward"].given() if "reward" in members else _ZERO,
             members["cost"].given() if "cost" in members else _ZERO,
-            tuple(self._charge(element) for element in _optional(members, "charges")),
+            tuple(self._charge(element) for element in optional(members, "charges")),
             "timed_out" in members and members["timed_out"].flag(),
         )
 
@@ -562,7 +540,7 @@ class _Reader:
 def _check_templates(members: Mapping[str, At], task: Task, faults: Faults) -> None:
     if not task.templates:
         return
-    _check_distinct(members["templates"], [template.name for template in task.templates])
+    check_distinct(members["templates"], [template.name for template in task.templates])
     try:
         active = active_templates(task.template_by_name)
     except BbtcError as error:

@@ -24,6 +24,7 @@ _FACTS = "the robot knows what it knows: `(unknown …)` and `(known …)` belon
 
 def refused(model: md.Model) -> Iterator[Diagnostic]:
     """An error for every construct of a model that grounding has no counterpart for."""
+    yield from _refused_events(model)
     for schema in model.schemas.values():
         if isinstance(schema.observe, me.Choice) and noise(schema.observe) is None:
             yield Diagnostic(
@@ -77,6 +78,21 @@ def _timeouts(model: md.Model) -> Iterator[Diagnostic]:
             message = f"action `{schema.name}` has a time-out, in a domain in which facts are hidden"
             hint = "write its outcomes as `probabilistic`, the one of the time-out, too"
             yield Diagnostic("BBT0445", message, schema.timeout.span, hint)
+
+
+def _refused_events(model: md.Model) -> Iterator[Diagnostic]:
+    hides = has_hidden_state(model)
+    for schema in model.schemas.values():
+        event = schema.exogenous
+        if event is not None and event.per == "second":
+            message = f"event `{schema.name}` is drawn by time, which actions do not take yet"
+            yield Diagnostic("BBT0452", message, schema.span, "draw it once an action: `:per action`")
+        elif hides and (event is not None or schema.during is not None):
+            what = f"event `{schema.name}`" if event is not None else f"`:while` of action `{schema.name}`"
+            message = f"{what} cannot be grounded beside hidden state"
+            hint = "hidden is what `:observe` tells, and what `:init` leaves open beside it; without these, "
+            hint += "an event that the robot does not see makes its facts unknown: `(unknown (p))`"
+            yield Diagnostic("BBT0452", message, schema.span, hint)
 
 
 def noise(observed: me.Choice) -> tuple[me.Set, Fraction, Fraction | None] | None:

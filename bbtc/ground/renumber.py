@@ -27,6 +27,7 @@ def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
         initial=tuple(gt.InitialState(probability, values) for values, probability in initial.items()),
         goal=mapper.condition(task.goal),
         actions=tuple(map(mapper.action, task.actions)),
+        events=tuple(map(mapper.event, task.events)),
         templates=tuple(map(mapper.template, task.templates)),
         components=tuple(map(mapper.component, task.components)),
     )
@@ -89,6 +90,16 @@ class Renumbering:
             precondition=self.condition(action.precondition),
             factors=self.factors(action.factors) or (gt.NO_CHANGE,),
             changes=tuple(replace(change, seen=self._seen(change.seen)) for change in action.changes),
+            during=None if action.during is None else self.condition(action.during),
+            on_abort=self.factors(action.on_abort),
+        )
+
+    def event(self, event: gt.GroundEvent) -> gt.GroundEvent:
+        """The event over the kept variables."""
+        return replace(
+            event,
+            precondition=self.condition(event.precondition),
+            factors=self.factors(event.factors) or (gt.NO_CHANGE,),
         )
 
     def component(self, component: gt.Component) -> gt.Component:

@@ -203,6 +203,10 @@ class GroundAction:
     different values, the Kleene maximum wins (delete before forget before add). ``changes`` tells what
     happens to hidden facts, at most one a component, independently of each other and of the factors.
 
+    Where there is ``during``, events are drawn while the action goes on, and not after it: it goes on where
+    that condition, which its precondition implies, is true then, and else ends with ``on_abort``.
+
+
     ``duration`` is how long it takes, drawn independently of the outcome (None: nobody says). After
     ``timeout`` seconds it is given up: one factor then has an outcome ``timed_out``, unless that is
     impossible, with the probability that it takes longer; the others are those of an action that does not."""
@@ -214,6 +218,8 @@ class GroundAction:
     cost: Fraction = Fraction(1)
     changes: tuple[Change, ...] = ()
     span: Span | None = field(default=None, compare=False, repr=False)
+    during: Condition | None = None
+    on_abort: tuple[Factor, ...] = ()
     duration: Duration | None = None
     timeout: Fraction | None = None
 
@@ -221,6 +227,36 @@ class GroundAction:
     def name(self) -> str:
         """``schema(arg,…)``."""
         return ground_name(self.schema, self.args)
+
+    @property
+    def possible_factors(self) -> tuple[Factor, ...]:
+        """Its factors, and those of its end by ``during``: not all of them happen at once."""
+        return (*self.factors, *self.on_abort)
+
+
+@dataclass(frozen=True, slots=True)
+class GroundEvent:
+    """What happens by itself, once an action: where the precondition is true, one outcome of every factor.
+
+    The events of one ``round`` happen at once: all read the state that the action left, or the round before,
+    and no two of them set a variable to different values."""
+
+    schema: str
+    args: tuple[str, ...]
+    precondition: Condition
+    factors: tuple[Factor, ...]
+    round: int = 0
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """``schema(arg,…)``."""
+        return ground_name(self.schema, self.args)
+
+    @property
+    def possible_factors(self) -> tuple[Factor, ...]:
+        """Its factors."""
+        return self.factors
 
 
 # --- templates -------------------------------------------------------------------------------
@@ -309,8 +345,8 @@ class TrueWorld:
 
 @dataclass(frozen=True)
 class Task:
-    """A ground planning task. Actions, templates and variables are sorted by name, signatures by
-    kind and symbol."""
+    """A ground planning task. Actions, templates and variables are sorted by name, events by round and name,
+    signatures by kind and symbol."""
 
     domain: str
     problem: str
@@ -335,6 +371,7 @@ class Task:
     true_worlds: tuple[TrueWorld, ...] = ()
     """What the problem says is true at the start of simulated runs, which begin in one of them. Nothing else
     reads it."""
+    events: tuple[GroundEvent, ...] = ()
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property
@@ -347,6 +384,19 @@ class Task:
         """Each action by its ground name."""
         return {action.name: action for action in self.actions}
 
+    @property
+    def occurrences(self) -> tuple[GroundAction | GroundEvent, ...]:
+        """Actions and events."""
+        return (*self.actions, *self.events)
+
+    @cached_property
+    def rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
+        """The events by round, in order."""
+        found: dict[int, list[GroundEvent]] = {}
+        for event in self.events:
+            found.setdefault(event.round, []).append(event)
+        return tuple(tuple(found[number]) for number in sorted(found))
+
     @cached_property
     def endless_beliefs(self) -> bool:
         """May ever new beliefs follow from each other, since readings are noisy or hidden facts change by
@@ -358,7 +408,7 @@ class Task:
     @cached_property
     def counts_reward(self) -> bool:
         """Is there anything that adds to the reward, or a metric of it?"""
-        outcomes = outcomes_of(factor for action in self.actions for factor in action.factors)
+        outcomes = outcomes_of(factor for each in self.occurrences for factor in each.possible_factors)
         return self.metric == "reward" or any(
             outcome.reward or any(charge.reward for charge in outcome.charges) for outcome in outcomes
         )
@@ -422,10 +472,13 @@ def seen_factors(task: Task, action: GroundAction) -> tuple[Factor, ...]:
     return tuple(found)
 
 
-def apparent_factors(task: Task, doing: GroundAction | GroundTemplate) -> tuple[Factor, ...]:
-    """:func:`seen_factors` and all that an action might make known, likewise; of a guide, its factors."""
-    if not isinstance(doing, GroundAction) or not doing.changes:
+def apparent_factors(task: Task, doing: GroundAction | GroundEvent | GroundTemplate) -> tuple[Factor, ...]:
+    """:func:`seen_factors` and all that an action might make known, or set where it is aborted, likewise; of
+    a guide or an event, its factors."""
+    if not isinstance(doing, GroundAction):
         return doing.factors
+    if not doing.changes:
+        return doing.possible_factors
     third = Fraction(1, 3)
     return seen_factors(task, doing) + tuple(
         Factor(tuple(Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth))

@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
-from bbtc.model.effect import Choice, Effect, LiftedDuration, Set, TimeOut, leaves
+from bbtc.model.effect import NOTHING, Add, Choice, Effect, LiftedDuration, Set, TimeOut, Together, leaves
 from bbtc.model.formula import And, Atom, Formula, Term
 from bbtc.model.types import Object, Parameter, TypeHierarchy
 from bbtc.source import Span
@@ -45,10 +45,22 @@ class Function:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
+Rate: TypeAlias = Literal["action", "second"]
+
+
+@dataclass(frozen=True, slots=True)
+class Exogenous:
+    """What makes an event of a schema: how often it is drawn, and the events that happen after it."""
+
+    per: Rate = "action"
+    before: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """An action. ``observe`` is what ``:observe`` shows: a condition, or a noisy draw; where that
-    ``repeats``, it is drawn anew only when a fact that it reads changes."""
+    """An action, or with ``exogenous`` an event, which happens by itself. ``observe`` is what ``:observe``
+    shows: a condition, or a noisy draw; where that ``repeats``, it is drawn anew only when a fact that it
+    reads changes."""
 
     name: str
     parameters: tuple[Parameter, ...]
@@ -59,10 +71,24 @@ class Schema:
     repeats: bool = False
     told: tuple[Reading, ...] = ()
     """What is told besides."""
+    during: Formula | None = None
+    """While this is true the action goes on; else it ends, with the effect ``on_abort``."""
+    on_abort: Effect = NOTHING
+    exogenous: Exogenous | None = None
     span: Span | None = field(default=None, compare=False, repr=False)
     duration: LiftedDuration | None = None
     timeout: TimeOut | None = None
     """Where it is given, ``effect`` is a choice of what happens then and what happens else."""
+
+    @property
+    def effects(self) -> Effect:
+        """All that it may do: its effect, and what happens where it is aborted."""
+        return self.effect if self.on_abort is NOTHING else Together((self.effect, self.on_abort))
+
+    @property
+    def counts(self) -> bool:
+        """Is it an event that adds to cost or reward? Then it matters wherever actions are started."""
+        return self.exogenous is not None and any(isinstance(leaf, Add) for leaf in leaves(self.effect))
 
     @property
     def tells(self) -> bool:
@@ -238,6 +264,7 @@ class Model:
     predicates: Mapping[str, Predicate]
     functions: Mapping[str, Function]
     schemas: Mapping[str, Schema]
+    """Actions, and events behind them."""
     rules: tuple[Rule, ...]
     sensors: tuple[Sensor, ...]
     templates: Mapping[str, Template]
@@ -260,6 +287,11 @@ class Model:
     goal_span: Span | None = field(default=None, compare=False, repr=False)
     span: Span | None = field(default=None, compare=False, repr=False)
     problem_span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def events(self) -> tuple[Schema, ...]:
+        """The schemas that are events."""
+        return tuple(schema for schema in self.schemas.values() if schema.exogenous is not None)
 
 
 def walk(body: Body) -> Iterator[Body]:
@@ -291,7 +323,26 @@ def set_values(model: Model) -> dict[str, set[Truth]]:
     """The values that actions may give the atoms of each predicate that any sets."""
     found: dict[str, set[Truth]] = {}
     for schema in model.schemas.values():
-        for leaf in leaves(schema.effect, possible=True):
+        for leaf in leaves(schema.effects, possible=True):
             if isinstance(leaf, Set):
                 found.setdefault(leaf.predicate, set()).add(leaf.value)
     return found
+
+
+def rounds_of(model: Model) -> dict[str, int]:
+    """By event, the number of its round: that after the last round of those which are before it, or 0."""
+    orders = {
+        name: schema.exogenous.before
+        for name, schema in model.schemas.items()
+        if schema.exogenous is not None
+    }
+    before: dict[str, list[str]] = {name: [] for name in orders}
+    for name, later in orders.items():
+        for each in later:
+            before[each].append(name)
+    rounds: dict[str, int] = {}
+    while len(rounds) < len(orders):  # no event is before itself: that was checked with the names
+        for name, earlier in before.items():
+            if name not in rounds and all(each in rounds for each in earlier):
+                rounds[name] = max((rounds[each] + 1 for each in earlier), default=0)
+    return rounds

@@ -6,18 +6,38 @@ rules are what their methods return, and ``item*`` is a list. A test holds the t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Literal, NamedTuple, TypeAlias
 
 from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax import ast, leaves
 from bbtc.syntax.engine import Token
 from bbtc.syntax.expressions import Expressions, Operand, keyword, numeric, parameters_of, unsupported
+from bbtc.syntax.fields import (
+    Before,
+    Body,
+    Condition,
+    Distribution,
+    Duration,
+    During,
+    Effect,
+    Field,
+    Fields,
+    Implied,
+    Observe,
+    OnAbort,
+    OnTimeout,
+    Parameters,
+    Per,
+    Repeats,
+    Sensed,
+    Timeout,
+    TimeoutProbability,
+)
 from bbtc.syntax.leaves import Misuse
 
-_V_co = TypeVar("_V_co", covariant=True)
 _Predicate: TypeAlias = ast.PredicateDeclaration
 _Function: TypeAlias = ast.FunctionDeclaration
 InitElements: TypeAlias = list[ast.InitElement | list[ast.InitElement]]
@@ -51,97 +71,6 @@ class DerivedHead(NamedTuple):
     name: Token
     parameters: ast.TypedList
     close: Token
-
-
-# --- fields ----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Field(Generic[_V_co]):
-    """One field of an action, a template, a sensor or an axiom: ``keyword value``."""
-
-    keyword: Token
-    value: _V_co
-
-
-class Parameters(Field[ast.TypedList]):
-    """``:parameters``, ``:vars``."""
-
-
-class Condition(Field[ast.Formula]):
-    """``:precondition``, ``:condition`` of a sensor, ``:context``."""
-
-
-class Effect(Field[ast.Effect]):
-    """``:effect``."""
-
-
-class Observe(Field[ast.Observation | ast.SensingModel]):
-    """``:observe``, ``:sensing-model``."""
-
-
-class Distribution(Field[ast.Effect]):
-    """``:distribution``."""
-
-
-class Repeats(Field[bool]):
-    """``:repeats``."""
-
-
-class Duration(Field[ast.Duration]):
-    """``:duration``."""
-
-
-class Timeout(Field[ast.NumericExpression]):
-    """``:timeout``."""
-
-
-class TimeoutProbability(Field[ast.Number]):
-    """``:timeout-probability``."""
-
-
-class OnTimeout(Field[ast.Effect]):
-    """``:on-timeout``."""
-
-
-class Body(Field[ast.Body]):
-    """``:body`` of a template."""
-
-
-class Sensed(Field[ast.Observation]):
-    """``:sensed``."""
-
-
-class Implied(Field[ast.Formula]):
-    """``:implies``."""
-
-
-class _Fields:
-    """The fields of a form, by kind. Raises :class:`Misuse` if one is given twice."""
-
-    def __init__(self, fields: Iterable[Field[object]]) -> None:
-        self._found: dict[type, Field[object]] = {}
-        for field in fields:
-            before = self._found.setdefault(type(field), field)
-            if before is not field:
-                message = f"`{field.keyword.text.lower()}` is given twice"
-                raise Misuse("BBT0110", message, field.keyword.span, None, before.keyword.span)
-
-    def get(self, kind: type[Field[_V_co]]) -> _V_co | None:
-        """The value of a kind of field, if it is given."""
-        field = self._found.get(kind)
-        return field.value if isinstance(field, kind) else None
-
-    def need(self, kind: type[Field[_V_co]], keyword: str, what: str, name: Token) -> _V_co:
-        """The value of a kind of field. Raises :class:`Misuse` if it is not given."""
-        value = self.get(kind)
-        if value is None:
-            raise Misuse("BBT0111", f"{what} lacks `{keyword}`", name.span)
-        return value
-
-    def parameters(self, close: Token) -> ast.TypedList:
-        """The parameters of a form that ends with a token."""
-        return parameters_of(self.get(Parameters) or (), close)
 
 
 class Builder(Expressions):
@@ -247,7 +176,7 @@ class Builder(Expressions):
     # --- actions and the like ----------------------------------------------------------------
 
     def action(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Action:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.Action(
             leaves.name(name),
             fields.parameters(close),
@@ -256,11 +185,25 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            fields.get(During),
+            fields.get(OnAbort),
             _timing(fields, head.to(close)),
         )
 
+    def exogenous(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Exogenous:
+        fields = Fields(given)
+        return ast.Exogenous(
+            leaves.name(name),
+            fields.parameters(close),
+            fields.get(Condition),
+            fields.need(Effect, ":effect", "the event", name),
+            fields.get(Per),
+            fields.get(Before),
+            head.to(close),
+        )
+
     def template(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Template:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.Template(
             leaves.declared("template", leaves.name(name)),
             fields.parameters(close),
@@ -271,7 +214,7 @@ class Builder(Expressions):
         )
 
     def sensor(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Sensor:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.Sensor(
             leaves.name(name),
             fields.parameters(close),
@@ -282,7 +225,7 @@ class Builder(Expressions):
         )
 
     def axiom(self, head: Token, given: list[Field[object]], close: Token) -> ast.Derived:
-        fields = _Fields(given)
+        fields = Fields(given)
         implied = fields.need(Implied, ":implies", "the axiom", head)
         parts = implied.parts if isinstance(implied, ast.And) else (implied,)
         heads = [part for part in parts if isinstance(part, ast.Atom)]
@@ -308,6 +251,14 @@ class Builder(Expressions):
     template_body = Body
     axiom_head = Implied
     on_timeout = OnTimeout
+    during = During
+    on_abort = OnAbort
+
+    def per(self, keyword: Token, name: Token) -> Per:
+        return Per(keyword, leaves.name(name))
+
+    def before(self, keyword: Token, names: Token) -> Before:
+        return Before(keyword, tuple(leaves.names(names)))
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
@@ -412,7 +363,7 @@ class Builder(Expressions):
     def observation(
         self, head: Token, name: Token, given: list[Field[object]], close: Token
     ) -> ast.ObservationModel:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.ObservationModel(
             leaves.name(name),
             fields.parameters(close),
@@ -529,7 +480,7 @@ class Builder(Expressions):
         return unsupported(keyword(head), head, close)
 
 
-def _timing(fields: _Fields, span: Span) -> ast.Timing | None:
+def _timing(fields: Fields, span: Span) -> ast.Timing | None:
     duration, timeout = fields.get(Duration), fields.get(Timeout)
     chance, effect = fields.get(TimeoutProbability), fields.get(OnTimeout)
     given = any(each is not None for each in (duration, timeout, chance, effect))

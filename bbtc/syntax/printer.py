@@ -15,7 +15,7 @@ from bbtc.syntax.layout import Doc, Setter, has_empty_lines
 from bbtc.syntax.scan import without_comments
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
-_Schema: TypeAlias = ast.Action | ast.Template | ast.Sensor | ast.ObservationModel
+_Schema: TypeAlias = ast.Action | ast.Exogenous | ast.Template | ast.Sensor | ast.ObservationModel
 
 
 def print_document(document: ast.Document) -> str:
@@ -75,7 +75,7 @@ class _Docs:
                 return self.listed("(:predicates", map(self.predicate, node.declarations), node, apart=True)
             case ast.Functions():
                 return self.listed("(:functions", map(self.function, node.declarations), node)
-            case ast.Action() | ast.Template() | ast.Sensor() | ast.ObservationModel():
+            case ast.Action() | ast.Exogenous() | ast.Template() | ast.Sensor() | ast.ObservationModel():
                 return self.schema(node)
             case ast.Derived():
                 return self.derived(node)
@@ -137,7 +137,11 @@ class _Docs:
                     doc = self.duration(value)
                 case _ if word in {":timeout", ":timeout-probability"}:
                     doc = self.expression(value)
-                case _ if word in {":effect", ":distribution", ":on-timeout"}:
+                case ast.Name():
+                    doc = _leaf(value)
+                case tuple():
+                    doc = self._names(value)
+                case _ if word in {":effect", ":distribution", ":on-abort", ":on-timeout"}:
                     doc = self.effect(value)
                 case _ if word == ":body":
                     doc = self.body(value)
@@ -160,6 +164,13 @@ class _Docs:
                 for amount, weight in zip(amounts, node.weights, strict=True)
             )
         return Doc(f"({node.kind}", amounts, ")", node.span, filled=True)
+
+    def _names(self, names: tuple[ast.Name, ...]) -> Doc:
+        """Names of events: one alone, or several in parentheses."""
+        if len(names) == 1:
+            return _leaf(names[0])
+        span = Span(names[0].span.source, names[0].span.start, names[-1].span.end)
+        return Doc("(", tuple(map(_leaf, names)), ")", span, glued=1)
 
     def _spelt(self, words: Sequence[str], after: int, span: Span) -> str:
         """Of words that mean the same, the one that stands in a form; the first where none does."""
@@ -489,7 +500,18 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
                     (":on-timeout", timing.on_timeout),
                 ]
             )
-            return [(":precondition", node.precondition), observed, repeats, (":effect", node.effect), *timed]
+            during = [(":while", node.during), (":on-abort", node.on_abort)]
+            return [
+                (":precondition", node.precondition),
+                observed,
+                repeats,
+                (":effect", node.effect),
+                *during,
+                *timed,
+            ]
+        case ast.Exogenous():
+            when = [(":precondition", node.precondition), (":per", node.per), (":before", node.before)]
+            return [*when, (":effect", node.effect)]
         case ast.Template():
             return [(":precondition", node.precondition), (":effect", node.effect), (":body", node.body)]
         case ast.ObservationModel():

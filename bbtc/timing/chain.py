@@ -93,6 +93,8 @@ class Doing:
     """An action in time, divided by whether it is given up."""
 
     def __init__(self, task: Task, action: GroundAction, limits: Limits) -> None:
+        if action.during is not None and task.events:
+            raise Untimed(f"{action.name} may be aborted on the way, and nobody says when")
         given_up = chance_given_up(action)
         if not given_up:
             whole = compile_action(task, action, limits)

@@ -48,7 +48,7 @@ def time_found(task: Task, root: Node, limits: Limits, seconds: Fraction | None)
     which of them a time-out is. Raises ``LimitReached``."""
     used = {node.action for node in actions_of(root)}
     actions = [action for action in task.actions if action.name in used]
-    if not all(map(_told, actions)):
+    if not all(map(_told, actions)) or (task.events and any(action.during is not None for action in actions)):
         return None
     own = recompute(explore(solvable_chain(_with_costs(task, _mean), root), limits), limits)
     if seconds is None:
@@ -105,9 +105,15 @@ def _with_costs(task: Task, cost: Callable[[GroundAction, bool], Fraction]) -> T
     def of_action(action: GroundAction) -> GroundAction:
         late = any(outcome.timed_out for factor in action.factors for outcome in factor.outcomes)
         factors = tuple(of_factor(factor, action) for factor in action.factors)
-        return replace(action, cost=Fraction(0) if late else cost(action, False), factors=factors)
+        cost_of_start = Fraction(0) if late else cost(action, False)
+        abort = tuple(of_factor(factor, None) for factor in action.on_abort)
+        return replace(action, cost=cost_of_start, factors=factors, on_abort=abort)
 
-    return replace(task, metric="cost", actions=tuple(map(of_action, task.actions)))
+    events = (
+        replace(event, factors=tuple(of_factor(factor, None) for factor in event.factors))
+        for event in task.events
+    )
+    return replace(task, metric="cost", actions=tuple(map(of_action, task.actions)), events=tuple(events))
 
 
 # --- by a deadline -------------------------------------------------------------------------------

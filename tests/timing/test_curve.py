@@ -20,6 +20,7 @@ from bbtc.source import SourceFile
 from bbtc.timing.figures import Times
 from bbtc.timing.figures import times as times_of
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
+from bbtc.verifier.timed import time_found
 from tests.long_form import LONG, amount
 from tests.timing.test_durations import drawn
 
@@ -353,3 +354,32 @@ def test_static_functions_give_durations(tmp_path: Path) -> None:
     found = times(tree).figures
     assert found is not None
     assert found.expected == (F(9), F(9))
+
+
+def test_events_happen_after_the_time_of_an_action() -> None:
+    tree = planned(
+        "(define (domain d) (:predicates (open) (inside)) "
+        "(:exogenous closes :precondition (open) :effect (probabilistic 0.5 (not (open)))) "
+        "(:action push :precondition (not (open)) :effect (open) :duration 3) "
+        "(:action enter :precondition (open) :effect (inside) :duration 2))"
+        "(define (problem p) (:domain d) (:init) (:goal (inside)) (:goal-probability 0.9))"
+    )
+    assert tree is not None
+    found = times(tree).figures
+    assert found is not None
+    assert found.expected == (F(8), F(8))  # two pushes of 3 s on average, then 2 s
+
+
+def test_what_may_be_aborted_on_the_way_takes_nobody_knows_how_long() -> None:
+    tree = planned(
+        "(define (domain d) (:predicates (open) (inside)) "
+        "(:exogenous closes :precondition (open) :effect (probabilistic 0.5 (not (open)))) "
+        "(:action push :precondition (not (open)) :effect (open) :duration 3) "
+        "(:action enter :precondition (open) :while (open) :effect (inside) :duration 2))"
+        "(define (problem p) (:domain d) (:init) (:goal (inside)) (:goal-probability 0.9))"
+    )
+    assert tree is not None
+    found = times(tree)
+    assert found.figures is None
+    assert "may be aborted on the way" in (found.untold or "")
+    assert time_found(tree.task, tree.root, Limits(), F(5)) is None

@@ -195,7 +195,8 @@ class _Search:
 
 def by_time(task: Task) -> Task:
     """The task in which an action costs the time that it takes on average."""
-    return replace(task, metric="cost", actions=tuple(map(_by_time, task.actions)))
+    events = (replace(event, factors=tuple(map(_without_cost, event.factors))) for event in task.events)
+    return replace(task, metric="cost", actions=tuple(map(_by_time, task.actions)), events=tuple(events))
 
 
 def _by_time(action: GroundAction) -> GroundAction:
