@@ -356,7 +356,7 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
 def _probabilities(known: Known) -> Iterator[Diagnostic]:
     for schema in known.model.schemas.values():
         for part in me.walk(schema.effects):
-            if isinstance(part, me.Choice):
+            if isinstance(part, me.Choice) and part.timeout is None:
                 yield from _doubtful(part)
 
 
@@ -401,11 +401,19 @@ def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
 def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
     """Whether renaming the parameter changes the action."""
     renamed = _renamed(schema, {parameter.name: other.name})
-    return renamed != (schema.precondition, schema.effect, schema.observe, schema.told, schema.on_abort)
+    whole = (
+        schema.precondition,
+        schema.effect,
+        schema.observe,
+        schema.told,
+        schema.on_abort,
+        schema.duration,
+    )
+    return renamed != whole
 
 
 def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, ...]:
-    """Precondition (``:while`` among it), effects and observations with other parameters."""
+    """Precondition (``:while`` among it), effects, observations and duration with other parameters."""
     free, observed = dict(binding), schema.observe
     told: object = None
     if isinstance(observed, me.Choice):
@@ -417,7 +425,8 @@ def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object,
         for each in schema.told
     )
     effect, abort = me.substitute(schema.effect, free), me.substitute(schema.on_abort, free)
-    return mf.substitute(schema.precondition, free), effect, told, besides, abort
+    duration = me.substitute_duration(schema.duration, free)
+    return mf.substitute(schema.precondition, free), effect, told, besides, abort, duration
 
 
 def _unused_templates(known: Known) -> Iterator[Diagnostic]:
