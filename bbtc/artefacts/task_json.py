@@ -160,7 +160,8 @@ def _event_to_json(event: GroundEvent, variables: Sequence[Variable]) -> Json:
         "precondition": condition_to_json(event.precondition, variables),
         **_chance_to_json(event.factors, variables),
     }
-    return value | ({"round": event.round} if event.round else {})
+    value |= {"round": event.round} if event.round else {}
+    return value | ({"per": event.rate} if event.rate != "action" else {})
 
 
 def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
@@ -452,7 +453,7 @@ class _Reader(HiddenReader):
 
     def event(self, at: At) -> GroundEvent:
         members = at.members(
-            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round"]
+            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round", "per"]
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -460,7 +461,14 @@ class _Reader(HiddenReader):
         if isinstance(number, bool) or not isinstance(number, int) or number < 0:
             raise members["round"].fault("BBT0604", "must be the number of a round, from 0 on")
         factors = self.chance(at, members)
-        return GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        event = GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        if "per" not in members or members["per"].word("action", "second") == "action":
+            return event
+        if any(sum(each.does_something for each in factor.outcomes) > 1 for factor in factors):
+            raise members["per"].fault(
+                "BBT0604", "one outcome of each factor at most does something each second"
+            )
+        return replace(event, rate="second")
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
         """The factors of an object with either ``outcomes`` or ``factors``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
-from bbtc.runtime.moving import MovingWorld, Test
+from bbtc.runtime.moving import MovingWorld, Rounds, Test
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -45,6 +45,7 @@ __all__ = [
     "Outcome",
     "Part",
     "Retry",
+    "Rounds",
     "Skipper",
     "State",
     "StopOutside",
