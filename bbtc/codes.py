@@ -145,6 +145,12 @@ _CODES = (
     Code("BBT0430", "too much for the text of a partially observable process"),
     Code("BBT0431", "true world that cannot be", _WARNING),
     Code("BBT0432", "reading that tells nothing, or the contrary"),
+    Code("BBT0443", "duration that cannot be"),
+    Code("BBT0444", "time-out that cannot be"),
+    Code("BBT0445", "time-out beside hidden facts"),
+    Code("BBT0446", "time that is not known"),
+    Code("BBT0447", "deadline that no run can meet"),
+    Code("BBT0448", "body that tries again for ever"),
     Code("BBT0451", "events that contradict each other"),
     Code("BBT0452", "event that cannot be grounded yet"),
     # 05xx: planning

@@ -197,6 +197,8 @@ def _in_effect(effect: me.Effect) -> Iterator[_Use]:
                 yield from _in_formula(condition)
             case me.ForEach(_, _, span):
                 yield ":universal-effects", span
+            case me.Choice(timeout=me.TimeOut()):
+                pass
             case me.Choice(_, oneof, span):
                 yield ":non-deterministic" if oneof else ":probabilistic-effects", span
             case _:

@@ -12,6 +12,7 @@ from bbtc.analysis import bodies, exogenous, facts, formulas, po_pddl, replanner
 from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
+from bbtc.analysis.timing import timed
 from bbtc.diagnostics import Related, Report
 from bbtc.kleene import Truth
 from bbtc.markov import reachable
@@ -199,7 +200,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
     if node.on_abort is not None and during is None:
         message = f"`:on-abort` of action `{signature.name}` says nothing: there is no `:while`"
         names.report.error("BBT0232", message, node.on_abort.span, "nothing ends the action before its end")
-    return md.Schema(
+    schema = md.Schema(
         signature.name,
         signature.parameters,
         precondition if during is None else mf.And((precondition, during)),
@@ -212,6 +213,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
         me.NOTHING if node.on_abort is None else formulas.effect(names, node.on_abort, scope),
         span=node.span,
     )
+    return timed(names, schema, node.timing, scope)
 
 
 def _observables(domain: ast.Definition) -> frozenset[str]:

@@ -15,6 +15,12 @@ from typing_extensions import assert_never
 
 from bbtc.artefacts.conditions import condition_to_json, number_of
 from bbtc.artefacts.cursor import At, Faults, check_distinct, clip, optional, run_reader
+from bbtc.artefacts.duration_json import (
+    duration_from_json,
+    duration_to_json,
+    may_time_out,
+    timeout_from_json,
+)
 from bbtc.artefacts.hidden_json import (
     HiddenReader,
     component_to_json,
@@ -109,7 +115,8 @@ def _variable_to_json(variable: Variable) -> Json:
     value: Json = {"name": variable.name}
     if split_name(variable.name) != (variable.predicate, variable.args):
         value |= {"predicate": variable.predicate, "args": list(variable.args)}
-    return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    value |= {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    return value | ({"external": True} if variable.external else {})
 
 
 def _change_to_json(change: Change, task: Task) -> Json:
@@ -134,6 +141,10 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
     }
     if action.changes:
         value["changes"] = [_change_to_json(change, task) for change in action.changes]
+    if action.duration is not None:
+        value["duration"] = duration_to_json(action.duration)
+    if action.timeout is not None:
+        value["timeout"] = given_text(action.timeout)
     if action.during is not None:
         value["while"] = condition_to_json(action.during, task.variables)
     if action.on_abort:
@@ -178,6 +189,8 @@ def _outcome_to_json(outcome: Outcome, variables: Sequence[Variable]) -> Json:
         value["cost"] = given_text(outcome.cost)
     if outcome.charges:
         value["charges"] = [_charge_to_json(charge, variables) for charge in outcome.charges]
+    if outcome.timed_out:
+        value["timed_out"] = True
     return value
 
 
@@ -214,8 +227,10 @@ def _template_to_json(template: GroundTemplate, variables: Sequence[Variable]) -
 
 def _body_to_json(body: Body, variables: Sequence[Variable]) -> Json:
     match body:
-        case BodyControl(kind, children):
-            return {"type": kind, "children": [_body_to_json(child, variables) for child in children]}
+        case BodyControl(kind, children, attempts):
+            counted = {} if attempts is None else {"attempts": attempts}
+            inner = [_body_to_json(child, variables) for child in children]
+            return {"type": kind, **counted, "children": inner}
         case BodyCondition(condition):
             return {"type": "condition", "condition": condition_to_json(condition, variables)}
         case BodyAction(action):
@@ -340,6 +355,10 @@ def _check_events(members: Mapping[str, At], task: Task) -> None:
         raise members["events"].fault("BBT0604", finding.message)
 
 
+_BODIES = (
+    *("sequence", "fallback", "skipper", "retry-until-success"),
+    *("condition", "action", "template"),
+)
 _TEMPLATE_FIELDS = ("name", "template", "args", "precondition", "body")
 _ZERO, _ONE = Fraction(0), Fraction(1)
 
@@ -351,7 +370,7 @@ def _metric(members: Mapping[str, At]) -> Literal["cost", "reward"]:
 
 
 def _variable(at: At) -> Variable:
-    members = at.members(["name", "values"], ["hidden", "predicate", "args"])
+    members = at.members(["name", "values"], ["hidden", "predicate", "args", "external"])
     name = members["name"].string()
     if "predicate" in members or "args" in members:
         at.members(["predicate", "args"], list(members))  # both or neither
@@ -363,7 +382,8 @@ def _variable(at: At) -> Variable:
     if sorted(values) not in (["false", "true"], ["false", "true", "unknown"]):
         raise members["values"].fault("BBT0604", "the values are true, false and, for some, unknown")
     hidden = "hidden" in members and members["hidden"].flag()
-    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden)
+    external = "external" in members and members["external"].flag()
+    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden, external=external)
 
 
 def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
@@ -406,19 +426,25 @@ class _Reader(HiddenReader):
     def action(self, at: At) -> GroundAction:
         members = at.members(
             ["name", "schema", "args", "cost", "precondition"],
-            ["outcomes", "factors", "oneof", "changes", "while", "on_abort"],
+            ["outcomes", "factors", "oneof", "changes", "while", "on_abort", "duration", "timeout"],
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
+        factors = self.chance(at, members)
+        if not may_time_out(factors, "timeout" in members):
+            message = "outcomes of a time-out belong into one distribution of an action that has one"
+            raise at.fault("BBT0604", message)
         return GroundAction(
             schema,
             args,
             self.condition(members["precondition"]),
-            self.chance(at, members),
+            factors,
             members["cost"].given(),
             tuple(self.change(each) for each in optional(members, "changes")),
             during=self.condition(members["while"]) if "while" in members else None,
             on_abort=self._abort(members["on_abort"]) if "on_abort" in members else (),
+            duration=duration_from_json(members["duration"]) if "duration" in members else None,
+            timeout=timeout_from_json(members["timeout"]) if "timeout" in members else None,
         )
 
     def _abort(self, at: At) -> tuple[Factor, ...]:
@@ -455,7 +481,7 @@ class _Reader(HiddenReader):
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:
-        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges"])
+        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges", "timed_out"])
         if depth > MAX_NESTING:
             raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
         return Outcome(
@@ -465,6 +491,7 @@ class _Reader(HiddenReader):
             members["reward"].given() if "reward" in members else _ZERO,
             members["cost"].given() if "cost" in members else _ZERO,
             tuple(self._charge(element) for element in optional(members, "charges")),
+            "timed_out" in members and members["timed_out"].flag(),
         )
 
     def _charge(self, at: At) -> Charge:
@@ -493,8 +520,14 @@ class _Reader(HiddenReader):
         )
 
     def _body(self, at: At, level: int) -> Body:
-        kind = kind_at(at, "sequence", "fallback", "skipper", "condition", "action", "template")
+        kind = kind_at(at, *_BODIES)
         match kind:
+            case "retry-until-success":
+                members = at.members(["type", "attempts", "children"])
+                tried = children_at(members["children"], level)
+                if len(tried) != 1:
+                    raise members["children"].fault("BBT0613", "what is tried again is one child")
+                return BodyControl(kind, (self._body(tried[0], level + 1),), members["attempts"].count())
             case "sequence" | "fallback" | "skipper":
                 children = children_at(at.members(["type", "children"])["children"], level)
                 return BodyControl(kind, tuple(self._body(child, level + 1) for child in children))

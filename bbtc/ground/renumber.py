@@ -121,8 +121,8 @@ class Renumbering:
 
     def _body(self, body: gt.Body) -> gt.Body:
         match body:
-            case gt.BodyControl(kind, children):
-                return gt.BodyControl(kind, tuple(self._body(child) for child in children))
+            case gt.BodyControl(_, children):
+                return replace(body, children=tuple(self._body(child) for child in children))
             case gt.BodyCondition(condition):
                 return gt.BodyCondition(self.condition(condition))
             case gt.BodyAction() | gt.BodyTemplate():

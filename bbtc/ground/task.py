@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
+from bbtc.durations import Duration
 from bbtc.ground.condition import Condition
 from bbtc.kleene import Truth
 from bbtc.source import Span
@@ -40,13 +41,15 @@ def unused_name(name: str, taken: Collection[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown."""
+    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
+    others change it, of whom the task knows nothing."""
 
     predicate: str
     args: tuple[str, ...]
     three_valued: bool
     hidden: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+    external: bool = False
 
     @property
     def name(self) -> str:
@@ -91,6 +94,8 @@ class Outcome:
     reward: Fraction = Fraction(0)
     cost: Fraction = Fraction(0)
     charges: tuple[Charge, ...] = ()
+    timed_out: bool = False
+    """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +206,12 @@ class GroundAction:
     happens to hidden facts, at most one a component, independently of each other and of the factors.
 
     Where there is ``during``, events are drawn while the action goes on, and not after it: it goes on where
-    that condition, which its precondition implies, is true then, and else ends with ``on_abort``."""
+    that condition, which its precondition implies, is true then, and else ends with ``on_abort``.
+
+
+    ``duration`` is how long it takes, drawn independently of the outcome (None: nobody says). After
+    ``timeout`` seconds it is given up: one factor then has an outcome ``timed_out``, unless that is
+    impossible, with the probability that it takes longer; the others are those of an action that does not."""
 
     schema: str
     args: tuple[str, ...]
@@ -212,6 +222,8 @@ class GroundAction:
     span: Span | None = field(default=None, compare=False, repr=False)
     during: Condition | None = None
     on_abort: tuple[Factor, ...] = ()
+    duration: Duration | None = None
+    timeout: Fraction | None = None
 
     @property
     def name(self) -> str:
@@ -254,10 +266,11 @@ class GroundEvent:
 
 @dataclass(frozen=True, slots=True)
 class BodyControl:
-    """A control node of a template body."""
+    """A control node of a template body; a retry-until-success has one child, and ``attempts``."""
 
-    kind: Literal["sequence", "fallback", "skipper"]
+    kind: Literal["sequence", "fallback", "skipper", "retry-until-success"]
     children: tuple[Body, ...]
+    attempts: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -425,7 +438,10 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     """Outcomes that do the same made one, with the sum of their probabilities."""
     merged: dict[tuple[object, ...], Outcome] = {}
     for outcome in outcomes:
-        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)
+        key = (
+            *(outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges),
+            outcome.timed_out,
+        )
         before = merged.get(key)
         if before is not None:
             total = before.probability + outcome.probability

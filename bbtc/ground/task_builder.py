@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from fractions import Fraction
 from itertools import compress, repeat
 from operator import itemgetter
@@ -10,15 +11,16 @@ from operator import itemgetter
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
+from bbtc.durations import Duration
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
-from bbtc.ground.effects import EffectLowering, LoweredEffect, arrange
+from bbtc.ground.effects import EffectLowering, LoweredDuration, LoweredEffect, LoweredTimeOut, arrange
 from bbtc.ground.events import clashes
 from bbtc.ground.goal import unreachable
-from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
-from bbtc.ground.normal import conjuncts, normalise
+from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend, projection
+from bbtc.ground.normal import conjuncts, normalise, timing_terms
 from bbtc.ground.reachability.atoms import Atoms
-from bbtc.ground.reachability.bulk import consumed, instances
+from bbtc.ground.reachability.bulk import Shared, consumed, instances
 from bbtc.ground.reachability.reach import Reach, reach
 from bbtc.ground.reachability.usage import called
 from bbtc.ground.refused import refused
@@ -182,7 +184,29 @@ class TaskBuilder:
                 repeat(schema.span),
                 *self._interruptions(schema, chunk),
             )
-        return made
+        return self._timed(schema, made)
+
+    def _timed(self, schema: md.Schema, made: list[gt.GroundAction]) -> list[gt.GroundAction]:
+        """The actions of a schema with how long they take, and when they are given up."""
+        if schema.duration is None and schema.timeout is None:
+            return made
+        used = list(timing_terms(schema.duration, schema.timeout))
+        slots, frame = projection(self.universe, schema.parameters, used)
+        takes, most = schema.duration, schema.timeout
+        duration = None if takes is None else LoweredDuration(self.effects, takes, frame)
+        timeout = None if most is None else LoweredTimeOut(self.effects, most, frame)
+
+        def timing(row: Row) -> tuple[Duration | None, Fraction | None]:
+            env = frame.env(row)
+            limit = None if timeout is None else timeout.seconds(env)
+            return None if duration is None else duration.of(env), limit
+
+        rows = [self.universe.row(action.args) for action in made]
+        found = Shared(slots, len(schema.parameters), lambda some: list(map(timing, some))).all(rows)
+        return [
+            replace(action, duration=seconds, timeout=limit)
+            for action, (seconds, limit) in zip(made, found, strict=True)
+        ]
 
     def _interruptions(
         self, schema: md.Schema, rows: list[Row]
@@ -295,6 +319,9 @@ class _TemplateMaker:
             case md.BodyControl(kind, children):
                 parts = [self._body(child) for child in children]
                 return lambda env: [gt.BodyControl(kind, tuple(each for part in parts for each in part(env)))]
+            case md.BodyRetry(attempts, child):
+                tried = self._body(child)
+                return lambda env: [gt.BodyControl("retry-until-success", tuple(tried(env)), attempts)]
             case md.BodyCondition(formula):
                 condition = self.builder.lowering.condition(formula, self.frame)
                 return lambda env: [gt.BodyCondition(condition(env))]

@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
-from bbtc.model.effect import NOTHING, Add, Choice, Effect, Set, Together, leaves
+from bbtc.model.effect import NOTHING, Add, Choice, Effect, LiftedDuration, Set, TimeOut, Together, leaves
 from bbtc.model.formula import And, Atom, Formula, Term
 from bbtc.model.types import Object, Parameter, TypeHierarchy
 from bbtc.source import Span
@@ -76,6 +76,14 @@ class Schema:
     on_abort: Effect = NOTHING
     exogenous: Exogenous | None = None
     span: Span | None = field(default=None, compare=False, repr=False)
+    duration: LiftedDuration | None = None
+    timeout: TimeOut | None = None
+    """Where it is given, ``effect`` is a choice of what happens then and what happens else."""
+
+    @property
+    def kind(self) -> Literal["action", "event"]:
+        """What messages call it."""
+        return "action" if self.exogenous is None else "event"
 
     @property
     def effects(self) -> Effect:
@@ -149,6 +157,15 @@ class BodyControl:
 
 
 @dataclass(frozen=True, slots=True)
+class BodyRetry:
+    """The child again where it fails, ``attempts`` times in all."""
+
+    attempts: int
+    child: Body
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class BodyCondition:
     """A condition of a template body."""
 
@@ -175,7 +192,7 @@ class BodyForeach:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
-Body: TypeAlias = BodyControl | BodyCondition | BodyCall | BodyForeach
+Body: TypeAlias = BodyControl | BodyRetry | BodyCondition | BodyCall | BodyForeach
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +306,7 @@ def walk(body: Body) -> Iterator[Body]:
         case BodyControl(_, children):
             for child in children:
                 yield from walk(child)
-        case BodyForeach(_, child):
+        case BodyForeach(_, child) | BodyRetry(_, child):
             yield from walk(child)
         case BodyCall() | BodyCondition():
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
+from bbtc.runtime.moving import MovingWorld, Test
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -40,6 +41,7 @@ __all__ = [
     "Latch",
     "Monitor",
     "Move",
+    "MovingWorld",
     "Outcome",
     "Part",
     "Retry",
@@ -48,6 +50,7 @@ __all__ = [
     "StopOutside",
     "StopWhenBlocked",
     "Telling",
+    "Test",
     "Try",
     "UntilSuccess",
     "Walk",

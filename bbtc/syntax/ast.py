@@ -19,6 +19,7 @@ from bbtc.syntax.formulas import BodyCall as BodyCall
 from bbtc.syntax.formulas import BodyCondition as BodyCondition
 from bbtc.syntax.formulas import BodyControl as BodyControl
 from bbtc.syntax.formulas import BodyForeach as BodyForeach
+from bbtc.syntax.formulas import BodyRetry as BodyRetry
 from bbtc.syntax.formulas import Branch as Branch
 from bbtc.syntax.formulas import Effect as Effect
 from bbtc.syntax.formulas import EffectAnd as EffectAnd
@@ -122,6 +123,8 @@ class Action:
     during: Formula | None = None
     on_abort: Effect | None = None
 
+    timing: Timing | None = None
+
 
 @dataclass(frozen=True, slots=True)
 class Exogenous:
@@ -133,6 +136,28 @@ class Exogenous:
     effect: Effect
     per: Name | None
     before: tuple[Name, ...] | None
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """What ``:duration`` gives: a number of seconds, or a distribution of them with its parameters; of
+    ``empirical``, the values and their ``weights``."""
+
+    kind: Literal["number", "uniform", "triangular", "empirical", "lognormal"]
+    amounts: tuple[NumericExpression, ...]
+    weights: tuple[Number, ...]
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """``:duration``, ``:timeout``, ``:timeout-probability``, ``:on-timeout`` of an action, where given."""
+
+    duration: Duration | None
+    timeout: NumericExpression | None
+    timeout_probability: Number | None
+    on_timeout: Effect | None
     span: Span = span_field()
 
 

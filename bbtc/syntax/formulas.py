@@ -189,6 +189,15 @@ class BodyControl:
 
 
 @dataclass(frozen=True, slots=True)
+class BodyRetry:
+    """``(retry n child)``."""
+
+    attempts: Number
+    child: Body
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
 class BodyCondition:
     """``(condition formula)``."""
 
@@ -215,4 +224,4 @@ class BodyForeach:
     span: Span = span_field()
 
 
-Body: TypeAlias = BodyControl | BodyCondition | BodyCall | BodyForeach
+Body: TypeAlias = BodyControl | BodyRetry | BodyCondition | BodyCall | BodyForeach
