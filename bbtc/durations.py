@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Context, Decimal, localcontext
 from fractions import Fraction
+from functools import cache
 from typing import TypeAlias
 
 from typing_extensions import assert_never
@@ -298,6 +300,72 @@ def exceeding(duration: Duration, seconds: Fraction) -> Fraction:
         return 1 - least
     grid = 10**9
     return Fraction(-((least - 1) * grid // 1), grid)
+
+
+# --- what happens meanwhile ----------------------------------------------------------------------
+
+GRID = 10**12
+"""Probabilities of what happens while an action goes on are multiples of one in so many."""
+
+
+@cache
+def meanwhile(chance: Fraction, duration: Duration, at_most: Fraction | None = None) -> Fraction:
+    """The probability that what happens with a ``chance`` each second happens at least once in the duration,
+    or by ``at_most``: 1 - E (1 - chance)^T, as the nearest multiple of 1/:data:`GRID`. Not known of lognormal
+    durations, for which it raises ``ValueError``."""
+    if chance == 0:
+        return _ZERO
+    if chance == 1:  # at once, unless it takes no time at all
+        return 1 - within(duration, _ZERO)[0]
+    with localcontext(Context(prec=100)):
+        base = Decimal(chance.denominator - chance.numerator) / Decimal(chance.denominator)
+        left = _expected_power(base, plain(duration), at_most)
+        nearest = (1 - left) * GRID
+        return Fraction(int(nearest.to_integral_value(ROUND_HALF_EVEN)), GRID)
+
+
+def _expected_power(base: Decimal, duration: Duration, at_most: Fraction | None) -> Decimal:
+    """E base^T, by the closed integrals of base^t (c + d t)."""
+
+    def number(value: Fraction) -> Decimal:
+        return Decimal(value.numerator) / Decimal(value.denominator)
+
+    def power(seconds: Fraction) -> Decimal:
+        return (number(seconds) * base.ln()).exp()
+
+    def integral(start: Fraction, end: Fraction, constant: Fraction, slope: Fraction) -> Decimal:
+        end = end if at_most is None else min(end, max(start, at_most))
+        rate = -base.ln()
+
+        def antiderivative(at: Fraction) -> Decimal:
+            return -power(at) * (number(constant + slope * at) / rate + number(slope) / rate**2)
+
+        return antiderivative(end) - antiderivative(start) if end > start else Decimal(0)
+
+    cut = Decimal(0)
+    if at_most is not None:
+        cut = power(at_most) * number(1 - within(duration, at_most)[0])
+    match duration:
+        case Fixed(seconds):
+            return power(seconds if at_most is None else min(seconds, at_most))
+        case Empirical(points):
+            ends = ((s if at_most is None else min(s, at_most), weight) for s, weight in points)
+            return sum((number(weight) * power(seconds) for seconds, weight in ends), Decimal(0))
+        case Uniform(low, high):
+            return cut + integral(low, high, 1 / (high - low), _ZERO)
+        case Triangular(low, mode, high):
+            total = cut
+            if mode > low:
+                rise = 2 / ((high - low) * (mode - low))
+                total += integral(low, mode, -rise * low, rise)
+            if high > mode:
+                fall = 2 / ((high - low) * (high - mode))
+                total += integral(mode, high, fall * high, -fall)
+            return total
+        case LogNormal():
+            raise ValueError("not known of a lognormal duration")
+        case _:
+            assert_never(duration)
 
 
 # --- in steps ------------------------------------------------------------------------------------

@@ -259,7 +259,8 @@ def _unreachable_actions(known: Known) -> Iterator[Diagnostic]:
             ):
                 continue  # of which BBT0313 tells
             related = () if first is None else (Related("this is never true", first.span),)
-            yield Diagnostic("BBT0302", f"action `{name}` can never apply", schema.span, related=related)
+            message = f"{schema.kind} `{name}` can never {'apply' if schema.exogenous is None else 'happen'}"
+            yield Diagnostic("BBT0302", message, schema.span, related=related)
 
 
 def _impossible(formula: mf.Formula, reached: facts.Reached) -> mf.Formula | None:
@@ -312,12 +313,13 @@ def _duplicates(known: Known) -> Iterator[Diagnostic]:
     seen: dict[tuple[object, ...], md.Schema] = {}
     for schema in known.model.schemas.values():
         renamed = {parameter.name: f"?{number}" for number, parameter in enumerate(schema.parameters)}
-        key = (tuple(parameter.types for parameter in schema.parameters), *_renamed(schema, renamed))
+        kinds = tuple(parameter.types for parameter in schema.parameters)
+        key = (schema.exogenous, kinds, *_renamed(schema, renamed))
         before = seen.setdefault(key, schema)
         if before is not schema:
             yield Diagnostic(
                 "BBT0305",
-                f"action `{schema.name}` does the same as `{before.name}`",
+                f"{schema.kind} `{schema.name}` does the same as `{before.name}`",
                 schema.span,
                 related=(Related(f"`{before.name}`", before.span),),
             )
@@ -338,10 +340,11 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
     possible = known.reached.actions
     for name, schema in known.model.schemas.items():
         changes = next(me.settings(schema.effects), None) is not None
-        if name not in actions and name in possible and changes:
+        waits = schema.exogenous is None and known.model.events  # for what happens by itself
+        if name not in actions and name in possible and changes and not waits:
             yield Diagnostic(
                 "BBT0307",
-                f"action `{name}` cannot matter to the goal",
+                f"{schema.kind} `{name}` cannot matter to the goal",
                 schema.span,
                 "no condition on the way to the goal reads what it changes",
             )
@@ -389,9 +392,9 @@ def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
             if not _occurs(schema, parameter, other):
                 yield Diagnostic(
                     "BBT0309",
-                    f"action `{schema.name}` never uses its parameter `{parameter.name}`",
+                    f"{schema.kind} `{schema.name}` never uses its parameter `{parameter.name}`",
                     parameter.span,
-                    "every object it may take makes another ground action",
+                    f"every object it may take makes another ground {schema.kind}",
                 )
 
 

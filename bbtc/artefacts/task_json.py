@@ -115,7 +115,8 @@ def _variable_to_json(variable: Variable) -> Json:
     value: Json = {"name": variable.name}
     if split_name(variable.name) != (variable.predicate, variable.args):
         value |= {"predicate": variable.predicate, "args": list(variable.args)}
-    return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    value |= {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    return value | ({"external": True} if variable.external else {})
 
 
 def _change_to_json(change: Change, task: Task) -> Json:
@@ -159,7 +160,8 @@ def _event_to_json(event: GroundEvent, variables: Sequence[Variable]) -> Json:
         "precondition": condition_to_json(event.precondition, variables),
         **_chance_to_json(event.factors, variables),
     }
-    return value | ({"round": event.round} if event.round else {})
+    value |= {"round": event.round} if event.round else {}
+    return value | ({"per": event.rate} if event.rate != "action" else {})
 
 
 def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
@@ -369,7 +371,7 @@ def _metric(members: Mapping[str, At]) -> Literal["cost", "reward"]:
 
 
 def _variable(at: At) -> Variable:
-    members = at.members(["name", "values"], ["hidden", "predicate", "args"])
+    members = at.members(["name", "values"], ["hidden", "predicate", "args", "external"])
     name = members["name"].string()
     if "predicate" in members or "args" in members:
         at.members(["predicate", "args"], list(members))  # both or neither
@@ -381,7 +383,8 @@ def _variable(at: At) -> Variable:
     if sorted(values) not in (["false", "true"], ["false", "true", "unknown"]):
         raise members["values"].fault("BBT0604", "the values are true, false and, for some, unknown")
     hidden = "hidden" in members and members["hidden"].flag()
-    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden)
+    external = "external" in members and members["external"].flag()
+    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden, external=external)
 
 
 def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
@@ -450,7 +453,7 @@ class _Reader(HiddenReader):
 
     def event(self, at: At) -> GroundEvent:
         members = at.members(
-            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round"]
+            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round", "per"]
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -458,7 +461,14 @@ class _Reader(HiddenReader):
         if isinstance(number, bool) or not isinstance(number, int) or number < 0:
             raise members["round"].fault("BBT0604", "must be the number of a round, from 0 on")
         factors = self.chance(at, members)
-        return GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        event = GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        if "per" not in members or members["per"].word("action", "second") == "action":
+            return event
+        if any(sum(each.does_something for each in factor.outcomes) > 1 for factor in factors):
+            raise members["per"].fault(
+                "BBT0604", "one outcome of each factor at most does something each second"
+            )
+        return replace(event, rate="second")
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
         """The factors of an object with either ``outcomes`` or ``factors``."""

@@ -79,7 +79,7 @@ def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transiti
     own = _compile_own(task, action, bounded)
     if not task.events and action.during is None:
         return own
-    events = _compile_events(task, bounded)
+    events = _compile_events(task.rounds(action), bounded)
     if action.during is None:
         return _cached(lambda values: _merged(_then(own(values), events), bounded))
     goes_on, abort = compile_condition(action.during), _compile_abort(action, bounded)
@@ -104,30 +104,30 @@ def _compile_abort(action: GroundAction, bounded: Bounded) -> Transition:
     return _cached(lambda values: results_of(values, action.cost, product_of(values, drawers, bounded.spend)))
 
 
-def _compile_events(task: Task, bounded: Bounded) -> Transition:
+def _compile_events(rounds: Iterable[tuple[GroundEvent, ...]], bounded: Bounded) -> Transition:
     """The events of one draw, round by round."""
 
     def compile_round(events: tuple[GroundEvent, ...]) -> Transition:
-        compiled = [
+        own = [
             (compile_condition(event.precondition), [compile_factor(f, bounded.spend) for f in event.factors])
             for event in events
         ]
 
         def happen(values: Values) -> tuple[Result, ...]:
-            due = (each for ready, drawers in compiled if ready(values) == Truth.TRUE for each in drawers)
+            due = (each for ready, drawers in own if ready(values) == Truth.TRUE for each in drawers)
             return results_of(values, ZERO, product_of(values, due, bounded.spend))
 
         return _cached(happen)
 
-    rounds = [compile_round(events) for events in task.rounds]
+    compiled = [compile_round(events) for events in rounds]
 
     def all_rounds(values: Values) -> tuple[Result, ...]:
         results: tuple[Result, ...] = (Result(ONE, ZERO, ZERO, values),)
-        for happen in rounds:
+        for happen in compiled:
             results = _merged(_then(results, happen), bounded)
         return results
 
-    return _cached(all_rounds) if len(rounds) > 1 else rounds[0] if rounds else all_rounds
+    return _cached(all_rounds) if len(compiled) > 1 else compiled[0] if compiled else all_rounds
 
 
 def _then(results: Iterable[Result], after: Transition) -> Iterator[Result]:

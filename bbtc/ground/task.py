@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
-from bbtc.durations import Duration
+from bbtc.durations import INSTANT, Duration, meanwhile
 from bbtc.ground.condition import Condition
 from bbtc.kleene import Truth
 from bbtc.source import Span
@@ -41,13 +41,15 @@ def unused_name(name: str, taken: Collection[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown."""
+    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
+    others change it, of whom the task knows nothing."""
 
     predicate: str
     args: tuple[str, ...]
     three_valued: bool
     hidden: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+    external: bool = False
 
     @property
     def name(self) -> str:
@@ -94,6 +96,11 @@ class Outcome:
     charges: tuple[Charge, ...] = ()
     timed_out: bool = False
     """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
+
+    @property
+    def does_something(self) -> bool:
+        """Does it set or add anything, or draw further?"""
+        return bool(self.effects or self.factors or self.reward or self.cost or self.charges)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +243,9 @@ class GroundAction:
 
 @dataclass(frozen=True, slots=True)
 class GroundEvent:
-    """What happens by itself, once an action: where the precondition is true, one outcome of every factor.
+    """What happens by itself, once an action: where the precondition is true, one outcome of every factor. By
+    the ``rate`` of a second, each factor draws the one outcome that does something, at most once, with its
+    probability for every second that the action takes (:func:`bbtc.durations.meanwhile`).
 
     The events of one ``round`` happen at once: all read the state that the action left, or the round before,
     and no two of them set a variable to different values."""
@@ -247,11 +256,18 @@ class GroundEvent:
     factors: tuple[Factor, ...]
     round: int = 0
     span: Span | None = field(default=None, compare=False, repr=False)
+    rate: Literal["action", "second"] = "action"
 
     @property
     def name(self) -> str:
         """``schema(arg,…)``."""
         return ground_name(self.schema, self.args)
+
+    def during(self, action: GroundAction) -> GroundEvent:
+        """The event as it happens with an action."""
+        if self.rate == "action":
+            return self
+        return replace(self, factors=tuple(_over_time(each, action) for each in self.factors), rate="action")
 
     @property
     def possible_factors(self) -> tuple[Factor, ...]:
@@ -390,12 +406,22 @@ class Task:
         return (*self.actions, *self.events)
 
     @cached_property
-    def rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
-        """The events by round, in order."""
+    def _rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
         found: dict[int, list[GroundEvent]] = {}
         for event in self.events:
             found.setdefault(event.round, []).append(event)
         return tuple(tuple(found[number]) for number in sorted(found))
+
+    @property
+    def moves_by_time(self) -> bool:
+        """Are there events that are the more probable, the longer an action takes?"""
+        return any(event.rate == "second" for event in self.events)
+
+    def rounds(self, action: GroundAction) -> tuple[tuple[GroundEvent, ...], ...]:
+        """The events that happen with an action by round, in order."""
+        if not self.moves_by_time:
+            return self._rounds
+        return tuple(tuple(event.during(action) for event in events) for events in self._rounds)
 
     @cached_property
     def endless_beliefs(self) -> bool:
@@ -422,6 +448,18 @@ class Task:
 ZERO = Fraction(0)
 ONE = Fraction(1)
 NO_CHANGE = Factor((Outcome(ONE, ()),))
+
+
+def _over_time(factor: Factor, action: GroundAction) -> Factor:
+    """A factor that is drawn every second until something happens, while an action goes on."""
+    happens = [each for each in factor.outcomes if each.does_something]
+    chance = sum((each.probability for each in happens), ZERO)
+    if not chance:
+        return factor
+    total = meanwhile(chance, INSTANT if action.duration is None else action.duration, action.timeout)
+    scaled = [replace(each, probability=each.probability * total / chance) for each in happens]
+    rest = () if total == 1 else (Outcome(1 - total, ()),)
+    return replace(factor, outcomes=(*(each for each in scaled if each.probability), *rest))
 
 
 def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:

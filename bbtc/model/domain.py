@@ -81,6 +81,11 @@ class Schema:
     """Where it is given, ``effect`` is a choice of what happens then and what happens else."""
 
     @property
+    def kind(self) -> Literal["action", "event"]:
+        """What messages call it."""
+        return "action" if self.exogenous is None else "event"
+
+    @property
     def effects(self) -> Effect:
         """All that it may do: its effect, and what happens where it is aborted."""
         return self.effect if self.on_abort is NOTHING else Together((self.effect, self.on_abort))

@@ -14,6 +14,7 @@ from bbtc import durations
 from bbtc.durations import Duration
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
+from bbtc.planner.mdp.contraction import contracted
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.state_space import StateSpace
 from bbtc.timing.chain import Doing, Happening
@@ -56,6 +57,7 @@ def timed_process(task: Task, limits: Limits) -> TimedProcess:
     many states."""
     space = explore_space(task, limits)
     space.require_complete()
+    space = contracted(space, limits)
     values = space.packing.values(space.states)
     number = {each: state for state, each in enumerate(values)}
     doings: dict[int, Doing] = {}
