@@ -21,6 +21,9 @@ from bbtc.syntax.fields import (
     Condition,
     Distribution,
     Duration,
+    DurativeCondition,
+    DurativeDuration,
+    DurativeEffect,
     During,
     Effect,
     Field,
@@ -56,6 +59,9 @@ _DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[
     "lognormal": ("lognormal", ("median", "sigma")),
 }
 """Distributions of durations, and what numbers they take."""
+
+
+_HOW_LONG = "write `(= ?duration n)`; or use an `:action`, with `:duration (uniform a b)` for one that varies"
 
 
 class Types(NamedTuple):
@@ -262,6 +268,37 @@ class Builder(Expressions):
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
+
+    def durative_action(
+        self, head: Token, name: Token, given: list[Field[object]], close: Token
+    ) -> ast.DurativeAction:
+        fields = Fields(given)
+        return ast.DurativeAction(
+            leaves.name(name),
+            fields.parameters(close),
+            fields.need(DurativeDuration, ":duration", "the durative action", name),
+            fields.get(DurativeCondition),
+            fields.get(DurativeEffect),
+            head.to(close),
+        )
+
+    durative_condition = DurativeCondition
+    durative_effect = DurativeEffect
+
+    def durative_duration(
+        self, keyword: Token, _: Token, variable: Token, operand: Operand, _close: Token
+    ) -> DurativeDuration:
+        if variable.text.lower() != "?duration":
+            raise Misuse("BBT0101", "a duration is given as `(= ?duration n)`", variable.span)
+        return DurativeDuration(keyword, _seconds(keyword, operand))
+
+    def duration_open(self, _: Token, empty: Token) -> DurativeDuration:
+        raise Misuse("BBT0449", "an action that takes any time is not supported", empty.span, _HOW_LONG)
+
+    def duration_bounded(self, _: Token, head: Token, _forms: list[None], close: Token) -> DurativeDuration:
+        raise Misuse(
+            "BBT0449", "a duration that the planner chooses is not supported", head.to(close), _HOW_LONG
+        )
 
     def duration(self, keyword: Token, operand: Operand) -> Duration:
         expression = _seconds(keyword, operand)

@@ -51,6 +51,18 @@ class Duration(Field[ast.Duration]):
     """``:duration``."""
 
 
+class DurativeDuration(Field[ast.NumericExpression]):
+    """``:duration`` of a durative action."""
+
+
+class DurativeCondition(Field[ast.Timed]):
+    """``:condition`` of a durative action."""
+
+
+class DurativeEffect(Field[ast.Timed]):
+    """``:effect`` of a durative action."""
+
+
 class Timeout(Field[ast.NumericExpression]):
     """``:timeout``."""
 
