@@ -129,7 +129,7 @@ def _in_domain(model: md.Model) -> Iterator[_Use]:
     for formula in facts.all_conditions(replace(model, goal=None, init=md.Init())):
         yield from _in_formula(formula)
     for schema in model.schemas.values():
-        yield from _in_effect(schema.effect)
+        yield from _in_effect(schema.effects)
         if schema.observe is not None:
             yield ":contingent", schema.observe_span
         if isinstance(schema.observe, me.Choice):
@@ -140,7 +140,10 @@ def _in_domain(model: md.Model) -> Iterator[_Use]:
     yield from ((":derived-predicates", rule.span) for rule in model.rules)
     declared = (each for each in model.predicates.values() if each.name not in model.thresholds)
     yield from ((":unknown", each.span) for each in declared if each.declared_three_valued)
-    for function in model.functions.values():
+    timing = {
+        name for each in model.schemas.values() for name in me.functions_timing(each.duration, each.timeout)
+    }
+    for function in (each for each in model.functions.values() if each.name not in timing):
         yield ":rewards" if function.name == "reward" else ":action-costs", function.span
 
 
@@ -197,6 +200,8 @@ def _in_effect(effect: me.Effect) -> Iterator[_Use]:
                 yield from _in_formula(condition)
             case me.ForEach(_, _, span):
                 yield ":universal-effects", span
+            case me.Choice(timeout=me.TimeOut()):
+                pass
             case me.Choice(_, oneof, span):
                 yield ":non-deterministic" if oneof else ":probabilistic-effects", span
             case _:

@@ -24,7 +24,9 @@ from itertools import repeat
 
 from typing_extensions import assert_never
 
+from bbtc import durations
 from bbtc.diagnostics import Report
+from bbtc.durations import Duration, Empirical
 from bbtc.ground.condition import FALSE, TRUE, Condition
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
 from bbtc.ground.normal import Block, Chance, groups, reads
@@ -67,9 +69,9 @@ class _Part:
             self.charges[guard] = both
 
     def draw(self, factors: Iterable[Factor]) -> None:
-        """Draw further factors; what is certain of them is no draw (rule 7)."""
+        """Draw further factors; what is certain of them is no draw (rule 7), unless it is a time-out."""
         for factor in factors:
-            if len(factor.outcomes) > 1:
+            if len(factor.outcomes) > 1 or factor.outcomes[0].timed_out:
                 self.factors.append(factor)
             else:
                 _absorb(self, factor.outcomes[0])
@@ -226,7 +228,7 @@ class LoweredEffect:
     def _plain_draw(self, owner: EffectLowering, block: Block, always: list[me.Set]) -> _Draw | None:
         """The only chance, if its branches do nothing but set variables."""
         (chance,) = block.chances
-        if chance.parameters or chance.guard:
+        if chance.parameters or chance.guard or chance.timeout is not None:
             return None
         branches = []
         for probability, branch in chance.branches:
@@ -372,6 +374,7 @@ class _LoweredChance:
         self._loop = _Loop(owner.lowering, frame, chance.parameters, chance.guard)
         self._branches = [(p, LoweredEffect(owner, block, frame)) for p, block in chance.branches]
         self._oneof = chance.oneof
+        self._timeout = None if chance.timeout is None else LoweredTimeOut(owner, chance.timeout, frame)
 
     def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
         """Every variable that some branch may set, with the conditions under which it does."""
@@ -389,7 +392,7 @@ class _LoweredChance:
         """One draw for every binding."""
         for conditions in self._loop.guards(env, above):
             outcomes: list[Outcome] = []
-            for probability, branch in self._branches:
+            for probability, branch in self._branches if self._timeout is None else self._given_up(env):
                 part = branch.part(env, conditions)  # 3
                 if len(part.factors) == 1 and part.factors[0].oneof == self._oneof:  # 5
                     for inner in part.factors[0].outcomes:
@@ -397,10 +400,62 @@ class _LoweredChance:
                         outcomes.append(replace(joined, probability=joined.probability * probability))
                 else:
                     outcomes.append(part.outcome(probability, tuple(part.factors)))
+                if self._timeout is not None and branch is self._branches[0][1]:
+                    outcomes = [replace(each, timed_out=True) for each in outcomes]
             yield Factor(merge_outcomes(outcomes), self._oneof)
+
+    def _given_up(self, env: Env) -> list[tuple[Fraction, LoweredEffect]]:
+        """The branches of a time-out that can be, with their probabilities."""
+        assert self._timeout is not None
+        late = self._timeout.probability(env)
+        both = zip((late, 1 - late), self._branches, strict=True)
+        return [(probability, branch) for probability, (_, branch) in both if probability]
 
 
 # --- numbers -------------------------------------------------------------------------------------
+
+
+class LoweredDuration:
+    """A compiled duration. What makes no sense is reported, and takes no time."""
+
+    def __init__(self, owner: EffectLowering, duration: me.LiftedDuration, frame: Frame) -> None:
+        self._owner = owner
+        self._duration = duration
+        self._amounts = [_Amounts(owner, frame).lower(amount) for amount in duration.amounts]
+
+    def of(self, env: Env) -> Duration:
+        """The duration in an environment."""
+        found = me.duration_of(self._duration, [each(env) for each in self._amounts])
+        wrong = durations.problem(found)
+        if wrong is not None:
+            self._owner.report.error("BBT0443", wrong, self._duration.span)
+            return durations.INSTANT
+        return durations.plain(durations.empirical(found.points) if isinstance(found, Empirical) else found)
+
+
+class LoweredTimeOut:
+    """A compiled time-out."""
+
+    def __init__(self, owner: EffectLowering, timeout: me.TimeOut, frame: Frame) -> None:
+        self._owner = owner
+        self._timeout = timeout
+        self._amount = _Amounts(owner, frame).lower(timeout.seconds)
+        self._duration = None if timeout.duration is None else LoweredDuration(owner, timeout.duration, frame)
+
+    def seconds(self, env: Env) -> Fraction:
+        """After so many seconds the action is given up."""
+        seconds = self._amount(env)
+        if not 0 < seconds <= durations.LONGEST:
+            wrong = "is not above 0" if seconds <= 0 else "is too long"
+            self._owner.report.error("BBT0444", f"a time-out {wrong}", self._timeout.span)
+            return ONE
+        return seconds
+
+    def probability(self, env: Env) -> Fraction:
+        """How probably it comes to that."""
+        if self._duration is None:
+            return ZERO if self._timeout.probability is None else self._timeout.probability
+        return durations.exceeding(self._duration.of(env), self.seconds(env))
 
 
 class _Amounts:
@@ -482,7 +537,7 @@ def _join(part: _Part, outcome: Outcome) -> Outcome:
     sets = {guard: dict(sets) for guard, sets in part.sets.items()}
     both = _Part(sets, part.cost, part.reward, dict(part.charges))
     _absorb(both, outcome)
-    return both.outcome(outcome.probability, tuple(both.factors))
+    return replace(both.outcome(outcome.probability, tuple(both.factors)), timed_out=outcome.timed_out)
 
 
 def _arranged(part: _Part) -> tuple[Factor, ...]:

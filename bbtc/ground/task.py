@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
+from bbtc.durations import INSTANT, Duration, meanwhile
 from bbtc.ground.condition import Condition
 from bbtc.kleene import Truth
 from bbtc.source import Span
@@ -40,13 +41,15 @@ def unused_name(name: str, taken: Collection[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown."""
+    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
+    others change it, of whom the task knows nothing."""
 
     predicate: str
     args: tuple[str, ...]
     three_valued: bool
     hidden: bool = False
     span: Span | None = field(default=None, compare=False, repr=False)
+    external: bool = False
 
     @property
     def name(self) -> str:
@@ -91,6 +94,13 @@ class Outcome:
     reward: Fraction = Fraction(0)
     cost: Fraction = Fraction(0)
     charges: tuple[Charge, ...] = ()
+    timed_out: bool = False
+    """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
+
+    @property
+    def does_something(self) -> bool:
+        """Does it set or add anything, or draw further?"""
+        return bool(self.effects or self.factors or self.reward or self.cost or self.charges)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,7 +208,15 @@ class GroundAction:
     """A schema with its arguments. One outcome of every factor happens, independently; all
     conditions are read before any effect. Where effects of one occurrence set a variable to
     different values, the Kleene maximum wins (delete before forget before add). ``changes`` tells what
-    happens to hidden facts, at most one a component, independently of each other and of the factors."""
+    happens to hidden facts, at most one a component, independently of each other and of the factors.
+
+    Where there is ``during``, events are drawn while the action goes on, and not after it: it goes on where
+    that condition, which its precondition implies, is true then, and else ends with ``on_abort``.
+
+
+    ``duration`` is how long it takes, drawn independently of the outcome (None: nobody says). After
+    ``timeout`` seconds it is given up: one factor then has an outcome ``timed_out``, unless that is
+    impossible, with the probability that it takes longer; the others are those of an action that does not."""
 
     schema: str
     args: tuple[str, ...]
@@ -209,11 +227,54 @@ class GroundAction:
     uninterruptible: bool = False
     """While it runs on a robot, nothing preempts it; figures do not ask."""
     span: Span | None = field(default=None, compare=False, repr=False)
+    during: Condition | None = None
+    on_abort: tuple[Factor, ...] = ()
+    duration: Duration | None = None
+    timeout: Fraction | None = None
 
     @property
     def name(self) -> str:
         """``schema(arg,…)``."""
         return ground_name(self.schema, self.args)
+
+    @property
+    def possible_factors(self) -> tuple[Factor, ...]:
+        """Its factors, and those of its end by ``during``: not all of them happen at once."""
+        return (*self.factors, *self.on_abort)
+
+
+@dataclass(frozen=True, slots=True)
+class GroundEvent:
+    """What happens by itself, once an action: where the precondition is true, one outcome of every factor. By
+    the ``rate`` of a second, each factor draws the one outcome that does something, at most once, with its
+    probability for every second that the action takes (:func:`bbtc.durations.meanwhile`).
+
+    The events of one ``round`` happen at once: all read the state that the action left, or the round before,
+    and no two of them set a variable to different values."""
+
+    schema: str
+    args: tuple[str, ...]
+    precondition: Condition
+    factors: tuple[Factor, ...]
+    round: int = 0
+    span: Span | None = field(default=None, compare=False, repr=False)
+    rate: Literal["action", "second"] = "action"
+
+    @property
+    def name(self) -> str:
+        """``schema(arg,…)``."""
+        return ground_name(self.schema, self.args)
+
+    def during(self, action: GroundAction) -> GroundEvent:
+        """The event as it happens with an action."""
+        if self.rate == "action":
+            return self
+        return replace(self, factors=tuple(_over_time(each, action) for each in self.factors), rate="action")
+
+    @property
+    def possible_factors(self) -> tuple[Factor, ...]:
+        """Its factors."""
+        return self.factors
 
 
 # --- templates -------------------------------------------------------------------------------
@@ -221,10 +282,11 @@ class GroundAction:
 
 @dataclass(frozen=True, slots=True)
 class BodyControl:
-    """A control node of a template body."""
+    """A control node of a template body; a retry-until-success has one child, and ``attempts``."""
 
-    kind: Literal["sequence", "fallback", "skipper"]
+    kind: Literal["sequence", "fallback", "skipper", "retry-until-success"]
     children: tuple[Body, ...]
+    attempts: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,8 +363,8 @@ class TrueWorld:
 
 @dataclass(frozen=True)
 class Task:
-    """A ground planning task. Actions, templates and variables are sorted by name, signatures by
-    kind and symbol."""
+    """A ground planning task. Actions, templates and variables are sorted by name, events by round and name,
+    signatures by kind and symbol."""
 
     domain: str
     problem: str
@@ -327,6 +389,7 @@ class Task:
     true_worlds: tuple[TrueWorld, ...] = ()
     """What the problem says is true at the start of simulated runs, which begin in one of them. Nothing else
     reads it."""
+    events: tuple[GroundEvent, ...] = ()
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property
@@ -339,6 +402,29 @@ class Task:
         """Each action by its ground name."""
         return {action.name: action for action in self.actions}
 
+    @property
+    def occurrences(self) -> tuple[GroundAction | GroundEvent, ...]:
+        """Actions and events."""
+        return (*self.actions, *self.events)
+
+    @cached_property
+    def _rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
+        found: dict[int, list[GroundEvent]] = {}
+        for event in self.events:
+            found.setdefault(event.round, []).append(event)
+        return tuple(tuple(found[number]) for number in sorted(found))
+
+    @property
+    def moves_by_time(self) -> bool:
+        """Are there events that are the more probable, the longer an action takes?"""
+        return any(event.rate == "second" for event in self.events)
+
+    def rounds(self, action: GroundAction) -> tuple[tuple[GroundEvent, ...], ...]:
+        """The events that happen with an action by round, in order."""
+        if not self.moves_by_time:
+            return self._rounds
+        return tuple(tuple(event.during(action) for event in events) for events in self._rounds)
+
     @cached_property
     def endless_beliefs(self) -> bool:
         """May ever new beliefs follow from each other, since readings are noisy or hidden facts change by
@@ -350,7 +436,7 @@ class Task:
     @cached_property
     def counts_reward(self) -> bool:
         """Is there anything that adds to the reward, or a metric of it?"""
-        outcomes = outcomes_of(factor for action in self.actions for factor in action.factors)
+        outcomes = outcomes_of(factor for each in self.occurrences for factor in each.possible_factors)
         return self.metric == "reward" or any(
             outcome.reward or any(charge.reward for charge in outcome.charges) for outcome in outcomes
         )
@@ -366,6 +452,18 @@ ONE = Fraction(1)
 NO_CHANGE = Factor((Outcome(ONE, ()),))
 
 
+def _over_time(factor: Factor, action: GroundAction) -> Factor:
+    """A factor that is drawn every second until something happens, while an action goes on."""
+    happens = [each for each in factor.outcomes if each.does_something]
+    chance = sum((each.probability for each in happens), ZERO)
+    if not chance:
+        return factor
+    total = meanwhile(chance, INSTANT if action.duration is None else action.duration, action.timeout)
+    scaled = [replace(each, probability=each.probability * total / chance) for each in happens]
+    rest = () if total == 1 else (Outcome(1 - total, ()),)
+    return replace(factor, outcomes=(*(each for each in scaled if each.probability), *rest))
+
+
 def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:
     """Every outcome of some factors, nested ones included, each before those nested in it."""
     for factor in factors:
@@ -378,7 +476,10 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     """Outcomes that do the same made one, with the sum of their probabilities."""
     merged: dict[tuple[object, ...], Outcome] = {}
     for outcome in outcomes:
-        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)
+        key = (
+            *(outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges),
+            outcome.timed_out,
+        )
         before = merged.get(key)
         if before is not None:
             total = before.probability + outcome.probability
@@ -411,10 +512,13 @@ def seen_factors(task: Task, action: GroundAction) -> tuple[Factor, ...]:
     return tuple(found)
 
 
-def apparent_factors(task: Task, doing: GroundAction | GroundTemplate) -> tuple[Factor, ...]:
-    """:func:`seen_factors` and all that an action might make known, likewise; of a guide, its factors."""
-    if not isinstance(doing, GroundAction) or not doing.changes:
+def apparent_factors(task: Task, doing: GroundAction | GroundEvent | GroundTemplate) -> tuple[Factor, ...]:
+    """:func:`seen_factors` and all that an action might make known, or set where it is aborted, likewise; of
+    a guide or an event, its factors."""
+    if not isinstance(doing, GroundAction):
         return doing.factors
+    if not doing.changes:
+        return doing.possible_factors
     third = Fraction(1, 3)
     return seen_factors(task, doing) + tuple(
         Factor(tuple(Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth))

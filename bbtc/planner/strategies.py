@@ -28,14 +28,15 @@ class Strategy(Protocol):
 @dataclass(frozen=True, slots=True)
 class Entry:
     """Module and function of a strategy, imported when used, and which options it knows: ``max_actions`` is
-    refused where it does not; ``retries`` changes nothing there. ``hidden``: does it plan with hidden
-    facts?"""
+    refused where it does not; ``retries`` changes nothing there. ``hidden``, ``events``: does it plan with
+    hidden facts, with what happens by itself?"""
 
     module: str
     function: str
     max_actions: bool = False
     retries: bool = False
     hidden: bool = True
+    events: bool = True
 
     def load(self) -> Strategy:
         """The strategy."""
@@ -47,7 +48,9 @@ STRATEGIES = {
     "refine": Entry("bbtc.planner.chaining.refine", "refine"),
     "search": Entry("bbtc.planner.chaining.search", "plan_search", retries=True),
     "policy": Entry("bbtc.planner.synthesis.policy", "plan_policy", max_actions=True, retries=True),
-    "strong-cyclic": Entry("bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic", hidden=False),
+    "strong-cyclic": Entry(
+        "bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic", hidden=False, events=False
+    ),
     "auto": Entry("bbtc.planner.auto", "plan_auto", max_actions=True, retries=True),
     "advised": Entry("bbtc.planner.auto", "plan_advised", max_actions=True, retries=True),
 }
@@ -84,6 +87,12 @@ def run_strategy(
             "BBT0505",
             f"the strategy '{name}' does not plan with hidden facts",
             hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.hidden)}",
+        )
+    if task.events and not STRATEGIES[name].events:
+        raise BbtcError.single(
+            "BBT0505",
+            f"the strategy '{name}' does not plan with events",
+            hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.events)}",
         )
     if not options.closed_world:
         from bbtc.planner.guard import most_more

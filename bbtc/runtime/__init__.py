@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
+from bbtc.runtime.moving import MovingWorld, Rounds, Test
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -42,14 +43,17 @@ __all__ = [
     "Latch",
     "Monitor",
     "Move",
+    "MovingWorld",
     "Outcome",
     "Part",
     "Retry",
+    "Rounds",
     "Skipper",
     "State",
     "StopOutside",
     "StopWhenBlocked",
     "Telling",
+    "Test",
     "Try",
     "UntilSuccess",
     "View",

@@ -85,6 +85,9 @@ class Lifted:
     external: set[str] = field(default_factory=set)
     functions: set[str] = field(default_factory=set)
     actions: list[dict[str, Form]] = field(default_factory=list)
+    events: list[dict[str, Form]] = field(default_factory=list)
+    watched: set[Fact] = field(default_factory=set)
+    """Facts that events must never set to different values at once."""
     rules: list[tuple[Form, dict[str, set[str]], Form]] = field(default_factory=list)
     init: list[Form] = field(default_factory=list)
     goal: Form = ""
@@ -110,6 +113,8 @@ class Lifted:
                     self.functions.update(function[0] for function in rest)
                 case ":action":
                     self.actions.append({":name": rest[0], **_fields(rest[1:])})
+                case ":exogenous":
+                    self.events.append({":name": rest[0], **_fields(rest[1:])})
                 case ":derived":
                     name, *parameters = rest[0]
                     self.rules.append(([name, *typed(parameters)], typed(parameters), rest[1]))
@@ -312,7 +317,12 @@ class Lifted:
         """Every action with arguments, by its name."""
         return {
             f"{action[':name']}({','.join(bound.values())})": Move(
-                action.get(":precondition", []), action.get(":effect", []), bound
+                ["and", action.get(":precondition", []), action.get(":while", [])],
+                action.get(":effect", []),
+                bound,
+                action.get(":while"),
+                action.get(":on-abort", []),
+                action.get(":duration", "0"),
             )
             for action in self.actions
             for bound in self.bindings(typed(action.get(":parameters", [])), {})
@@ -329,7 +339,62 @@ class Lifted:
             cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
             facts = dict(state)
             move.results[state] = cost, _states((p, {**facts, **change}) for p, change, _ in draws)
+            if self.events:
+                move.results[state] = self.with_events(move, state, move.results[state])
         return move.results[state]
+
+    def with_events(self, move: Move, state: State, alone: Result) -> Result:
+        """What an action costs on average and leads to, with what happens by itself."""
+        if move.during is None:
+            cost, states = alone
+            found = self.happening(states, move.takes)
+            return cost + found[0] * self.counts, found[1]
+        cost, states = self.happening({state: Fraction(1)}, move.takes)
+        total = cost * self.counts + (0 if self.counts else 1)
+        after: dict[State, Fraction] = {}
+        for each, p in states.items():
+            world = self.world(each)
+            going_on = self.value(move.during, move.bound, world) == 2
+            effect = move.effect if going_on else move.abort
+            for q, change, more in self.effect(effect, move.bound, world):
+                total += p * q * more * self.counts
+                for follower, r in _states([(Fraction(1), {**dict(each), **change})]).items():
+                    after[follower] = after.get(follower, Fraction(0)) + p * q * r
+        return total, after
+
+    def happening(self, states: dict[State, Fraction], takes: Form) -> Result:
+        """What events cost on average, and what they make of some states, in the time of an action."""
+        total = Fraction(0)
+        for events in self.rounds:
+            after: dict[State, Fraction] = {}
+            for state, p in states.items():
+                world, facts = self.world(state), dict(state)
+                due = [
+                    self.effect(_in_time(event, takes), bound, world)
+                    for event in events
+                    for bound in self.bindings(typed(event.get(":parameters", [])), {})
+                    if self.value(event.get(":precondition", []), bound, world) == 2
+                ]
+                for number, one in enumerate(due):
+                    for other in due[:number]:
+                        clash = _contradicting(one, other) & self.watched
+                        assert not clash, f"events contradict each other: {clash}"
+                for q, change, cost in _together(due):
+                    total += p * q * cost
+                    for follower, r in _states([(Fraction(1), {**facts, **change})]).items():
+                        after[follower] = after.get(follower, Fraction(0)) + p * q * r
+            states = after
+        return total, states
+
+    @cached_property
+    def rounds(self) -> list[list[dict[str, Form]]]:
+        """The events that happen at once, those first that others wait for."""
+        left, found = list(self.events), []
+        while left:
+            later = {name for event in left for name in _listed(event.get(":before", []))}
+            found.append([event for event in left if event[":name"] not in later])
+            left = [event for event in left if event[":name"] in later]
+        return found
 
     def world(self, state: State) -> World:
         """:meth:`derived`, remembered."""
@@ -369,6 +434,9 @@ class Move:
     needs: Form
     effect: Form
     bound: Binding
+    during: Form | None = None
+    abort: Form = ""
+    takes: Form = "0"
     draws: dict[tuple[bool, ...], Draws] = field(default_factory=dict)
     results: dict[State, Result] = field(default_factory=dict)
 
@@ -462,6 +530,70 @@ def _together(parts: Iterable[Draws]) -> Draws:
         ]
         result = joined if len(joined) == 1 else _merged(joined)
     return result
+
+
+def _in_time(event: dict[str, Form], takes: Form) -> Form:
+    """The effect of an event in the time of an action; of one by the second, with what it comes to."""
+    if event.get(":per") != "second":
+        return event[":effect"]
+
+    def scaled(form: Form) -> Form:
+        match form:
+            case ["probabilistic", chance, effect]:
+                return ["probabilistic", str(_meanwhile(Fraction(chance), takes)), effect]
+            case ["and", *parts]:
+                return ["and", *map(scaled, parts)]
+            case ["forall", parameters, part]:
+                return ["forall", parameters, scaled(part)]
+            case ["when", condition, part]:
+                return ["when", condition, scaled(part)]
+            case _:
+                return ["probabilistic", str(_meanwhile(Fraction(1), takes)), form] if form else form
+
+    return scaled(event[":effect"])
+
+
+_PARTS = 20_000
+
+
+def _meanwhile(chance: Fraction, takes: Form) -> Fraction:
+    """How probably it happens in some time, by the midpoint rule over the quantiles of it."""
+    match takes:
+        case str(seconds):
+            times = [float(Fraction(seconds))]
+        case ["uniform", low, high]:
+            times = [float(low) + (float(high) - float(low)) * (n + 0.5) / _PARTS for n in range(_PARTS)]
+        case ["triangular", low, mode, high]:
+            times = [_triangle((n + 0.5) / _PARTS, *map(float, (low, mode, high))) for n in range(_PARTS)]
+        case ["empirical", *points]:
+            assert len({weight for _, weight in points}) == 1
+            times = [float(seconds) for seconds, _ in points]
+        case _:
+            raise ValueError(takes)
+    never = sum((1 - float(chance)) ** time for time in times) / len(times)
+    return Fraction(round((1 - never) * 10**12), 10**12)
+
+
+def _triangle(share: float, low: float, mode: float, high: float) -> float:
+    """The quantile of a triangular distribution."""
+    turn = (mode - low) / (high - low)
+    if share < turn:
+        return low + float((share * (high - low) * (mode - low)) ** 0.5)
+    return high - float(((1 - share) * (high - low) * (high - mode)) ** 0.5)
+
+
+def _contradicting(one: Draws, other: Draws) -> set[Fact]:
+    """The facts that two draws may set to different values."""
+    return {
+        fact
+        for (_, first, _), (_, second, _) in product(one, other)
+        for fact, value in first.items()
+        if second.get(fact, value) != value
+    }
+
+
+def _listed(names: Form) -> list[str]:
+    return [names] if isinstance(names, str) else list(names)
 
 
 def _merged(draws: Iterable[tuple[Fraction, Change, Fraction]]) -> Draws:

@@ -14,6 +14,9 @@ _ABOVE = {
 }
 _EITHER = "(either a b)"
 _CHANCES = ["0.5 {} 0.5 {}", "1/3 {} .25 {}", "0.2 {}", "1 {} 0 {}", "0.1 {} 0.2 {} 0.7 {}", "0.9 {}"]
+_RATES = ["0.3", "0.3", "1/100", "1"]
+_DURATIONS = ["2", "0", "1.5", "(uniform 1 4)", "(triangular 0 2 5)", "(empirical (1 0.5) (3 0.5))"]
+_DRAWS = re.compile(r"probabilistic|oneof")
 _AMOUNTS = ["1", "1/2", "(base)", "(+ 1 (base))", "(* 2 (+ (base) 0.5))"]
 
 Scope = dict[str, str]
@@ -38,6 +41,7 @@ class _Writer:
         }
         self.unary = unary
         self.callable: dict[str, list[str]] = {}
+        self.scopes: dict[str, Scope] = {}
         self.declared = {**self.fluents, **self.static, **self.derived}
         self.cost = random.choice(["total-cost", "fuel", ""])
 
@@ -129,6 +133,7 @@ class _Writer:
 
     def action(self, name: str) -> str:
         listed, scope = self.parameters("?x ?y", 2)
+        self.scopes[name] = scope
         self.callable[name] = list(scope.values())
         atom, other = self.atom(scope, self.fluents), self.atom(scope, {**self.static, **self.derived})
         plain = self.among(
@@ -286,7 +291,48 @@ class _Writer:
         ]
         return f"({' '.join([name, *map(self.random.choice, found)])})" if all(found) else "(p)"
 
-    def text(self) -> str:
+    def event(self, number: int, before: list[str]) -> str:
+        """An event, most of the time before all of some others."""
+        listed, scope = self.parameters("?x ?y", 1)
+        needs = self.among(self.condition(scope, 1, self.declared), self.atom(scope, self.fluents))
+        happens = self.effect(scope, 1, priced=self.random.random() < 0.3)
+        rate = self.among("", ":per action")
+        if self.random.random() < 0.3:
+            happens, rate = self.among(self.effect(scope, 0, priced=False), happens), ":per second"
+            happens = self.effect(scope, 0, priced=False) if _DRAWS.search(happens) else happens
+        fields = [
+            f":parameters ({listed})",
+            f":precondition {self.among(needs, needs, '()')}",
+            f":effect {self.among(happens, f'(probabilistic {self.among(*_RATES)} {happens})')}",
+            rate,
+        ]
+        if before and self.random.random() < 0.8:
+            fields.append(f":before {before[0] if len(before) == 1 else '(' + ' '.join(before) + ')'}")
+        self.random.shuffle(fields)
+        return f"(:exogenous event-{number} {' '.join(fields)})"
+
+    def events(self, actions: list[str]) -> list[str]:
+        """The actions, of which some go on only while something is true, and some events."""
+        found = []
+        for plain, scope in zip(actions, self.scopes.values(), strict=True):
+            text = plain
+            if self.random.random() < 0.5:
+                text = f"{plain[:-1]} :duration {self.among(*_DURATIONS)})"
+            if self.random.random() < 0.6:
+                found.append(text)
+                continue
+            more = f" :while {self.condition(scope, 1, self.declared)}"
+            if self.random.random() < 0.5:
+                more += f" :on-abort {self.effect(scope, 1)}"
+            found.append(f"{text[:-1]}{more})")
+        names: list[str] = []
+        for number in range(self.random.randint(1, 3)):
+            found.append(self.event(number, names))
+            names.append(f"event-{number}")
+        self.random.shuffle(found)
+        return found
+
+    def text(self, *, events: bool = False) -> str:
         def listed(names: list[str]) -> str:
             return " ".join(f"{name} - {self.objects[name]}" for name in names)
 
@@ -318,6 +364,9 @@ class _Writer:
             *actions,
             *templates,
         ]
+        if events:  # last of all, so that all else is as without them
+            changed = self.events(actions)
+            sections = [each for each in sections if each not in actions and each not in templates] + changed
         metric = f"(:metric minimize ({self.cost}))" if self.cost else ""
         rest = [name for name in every if name not in self.constants]
         return "\n".join(
@@ -332,6 +381,7 @@ class _Writer:
         )
 
 
-def random_text(seed: int) -> str:
-    """A domain and a problem; the same for the same seed."""
-    return _Writer(seed).text()
+def random_text(seed: int, *, events: bool = False) -> str:
+    """A domain and a problem; the same for the same seed. With ``events``, things happen by themselves, and
+    actions may go on while something is true only; there are no templates then."""
+    return _Writer(seed).text(events=events)

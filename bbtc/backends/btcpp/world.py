@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from typing_extensions import assert_never
 
 from bbtc.backends.btcpp import cppcode
@@ -9,9 +11,10 @@ from bbtc.backends.btcpp.leaves import LeafWriter
 from bbtc.backends.btcpp.monitor import MonitorTable, braces, key_code, key_of
 from bbtc.backends.btcpp.names import BtcppNames
 from bbtc.backends.interface import Leaf, action_symbol, variable_symbol
+from bbtc.backends.shape import normal
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
 from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.task import Factor, Outcome
+from bbtc.ground.task import Factor, GroundEvent, Outcome
 from bbtc.kleene import Truth
 from bbtc.tree.monitor import Monitor, Telling, Walk
 from bbtc.tree.nodes import Tree
@@ -36,6 +39,16 @@ class SimulatedRobot : public Robot {
       : world_(model(), seed, ticks, report) {}
 
   SimulatedWorld& world() { return world_; }
+"""
+
+
+_MOVING_CLASS = """\
+class SimulatedRobot : public Robot {
+ public:
+  SimulatedRobot(std::uint64_t seed, unsigned ticks, std::ostream* report)
+      : world_(model(), moves(), seed, ticks, report) {}
+
+  MovingWorld& world() { return world_; }
 """
 
 
@@ -67,7 +80,11 @@ class SimulatedRobotWriter:
         if self._tree.monitor is not None:
             head = head.replace('"simulated_world.hpp"', '"hidden_world.hpp"')
             kind, begun = "HiddenWorld", _HIDDEN_CLASS
+        elif self._task.events:
+            head = head.replace('"simulated_world.hpp"', '"moving_world.hpp"')
+            kind, begun = "MovingWorld", _MOVING_CLASS
         lines = [cppcode.fill(head, ROBOT_TREE=self._space) + self._model()]
+        lines += [self._moves()] if self._task.events else []
         lines += [] if self._tree.monitor is None else [self._hidden(self._tree.monitor)]
         lines += [begun.rstrip(), *map(self._method, self._leaves.asked())]
         lines += ["", " private:", f"  {kind} world_;", "};", ""]
@@ -95,6 +112,38 @@ class SimulatedRobotWriter:
                 f"      /*facts=*/{_rows(facts)},",
                 f"      /*initial=*/{_rows(initial)},",
                 f"      /*actions=*/{_rows(actions)}}};",
+                "  return all;",
+                "}",
+                "",
+            ]
+        )
+
+    def _moves(self) -> str:
+        """What happens by itself, and which actions that may end."""
+        tables: dict[tuple[tuple[GroundEvent, ...], ...], str] = {}
+        lines: list[str] = []
+        events: list[str] = []
+        for action in actions_used(self._tree):
+            rounds = self._task.rounds(action)
+            if rounds not in tables:
+                tables[rounds] = f"moves{len(tables) + 1}"
+                lines += [f"  static const Rounds {tables[rounds]} =", f"      {self._rounds(rounds)};"]
+            key = cppcode.literal(key_of(self._names, action_symbol(action), action.args))
+            events.append(f"{{{key}, {tables[rounds]}}}")
+        interrupted = [
+            f"{{{cppcode.literal(key_of(self._names, action_symbol(action), action.args))},\n"
+            f"           Interruption{{{self._lambda(normal(self._task, action.during))}, "
+            f"{self._factors(action.on_abort)}}}}}"
+            for action in actions_used(self._tree)
+            if action.during is not None
+        ]
+        return "\n".join(
+            [
+                "inline const Moves& moves() {",
+                *lines,
+                "  static const Moves all = {",
+                f"      /*events=*/{_rows(events)},",
+                f"      /*interrupted=*/{_rows(interrupted)}}};",
                 "  return all;",
                 "}",
                 "",
@@ -152,6 +201,23 @@ class SimulatedRobotWriter:
         when = "nullptr" if observation.when is None else self._lambda(observation.when)
         items = [cppcode.literal(telling.name), f"{right}u", f"{wrong}u"]
         return f"Telling{braces([*items, self._lambda(observation.condition), when])}"
+
+    def _rounds(self, rounds: Sequence[Sequence[GroundEvent]]) -> str:
+        return _rows(
+            [
+                _rows(
+                    [
+                        f"Event{{{self._anywhere(normal(self._task, event.precondition))}, "
+                        f"{self._factors(event.factors)}}}"
+                        for event in events
+                    ]
+                )
+                for events in rounds
+            ]
+        )
+
+    def _anywhere(self, condition: Condition) -> str:
+        return "nullptr" if condition == TRUE else self._lambda(condition)
 
     def _lambda(self, condition: Condition) -> str:
         return f"[](const State& s) {{ return {self._test(condition)}; }}"

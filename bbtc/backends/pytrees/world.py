@@ -3,7 +3,7 @@ as far as the tree can tell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
 from bbtc.backends.interface import Interface
@@ -18,8 +18,10 @@ from bbtc.backends.pytrees.parts import (
     words_tuple,
 )
 from bbtc.backends.pytrees.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
+from bbtc.backends.shape import normal
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
-from bbtc.ground.task import Factor, Outcome, Task
+from bbtc.ground.condition import Condition
+from bbtc.ground.task import Factor, GroundEvent, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree
 
@@ -47,7 +49,9 @@ class WorldWriter:
             (words_tuple((action.schema, *action.args)), self._factors(action.factors))
             for action in self._actions
         )
-        more = []
+        more: list[list[str]] = []
+        if self._task.events:
+            more = self._moving()
         if self._monitor is not None:
             more = MonitorWriter(self._task, self._monitor, self._conditions).tables()
         return [
@@ -59,10 +63,58 @@ class WorldWriter:
             *more,
         ]
 
+    @property
+    def base(self) -> str:
+        """The class of the simulated world's behaviour."""
+        if self._monitor is not None:
+            return "HiddenWorld"
+        return "MovingWorld" if self._task.events else "World"
+
+    def _moving(self) -> list[list[str]]:
+        """What happens by itself, and ``INTERRUPTED``."""
+        tables: dict[tuple[tuple[GroundEvent, ...], ...], str] = {}
+        names: list[tuple[str, Code]] = []
+        lines: list[list[str]] = []
+        for action in self._actions:
+            rounds = self._task.rounds(action)
+            if rounds not in tables:
+                tables[rounds] = "MOVES" if not tables else f"MOVES_{len(tables) + 1}"
+                lines.append(layout(self._rounds(rounds), f"{tables[rounds]}: Rounds = "))
+            names.append((words_tuple((action.schema, *action.args)), tables[rounds]))
+        interrupted = mapping(
+            (
+                words_tuple((action.schema, *action.args)),
+                call("", self._test(action.during), self._factors(action.on_abort)),
+            )
+            for action in self._actions
+            if action.during is not None
+        )
+        return [
+            *lines,
+            [
+                *layout(mapping(names), "EVENTS: dict[Fact, Rounds] = "),
+                '"""What happens by itself with each action, round by round: where it may, and what."""',
+            ],
+            [
+                *layout(interrupted, "INTERRUPTED: dict[Fact, tuple[Test, list[Factor]]] = "),
+                '"""While what actions go on that events may end, and what happens else."""',
+            ],
+        ]
+
+    def _rounds(self, rounds: Sequence[Sequence[GroundEvent]]) -> Code:
+        return sequence(
+            sequence(
+                call("", self._test(event.precondition), self._factors(event.factors)) for event in events
+            )
+            for events in rounds
+        )
+
+    def _test(self, condition: Condition) -> Code:
+        return Prefixed("lambda s: ", self._conditions.write(normal(self._task, condition), self._read))
+
     def world(self) -> list[str]:
         """The class ``SimulatedWorld``."""
-        base = "World" if self._monitor is None else "HiddenWorld"
-        lines = [f"class SimulatedWorld({base}):", '    """Plays the robot."""']
+        lines = [f"class SimulatedWorld({self.base}):", '    """Plays the robot."""']
         for leaf in self._interface.asked:
             answer = flat(call("self._value", *fact_of(leaf)))
             lines += method(self._methods[leaf.symbol], leaf, CONDITION_TYPE, f"return {answer}")
