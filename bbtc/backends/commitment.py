@@ -22,8 +22,8 @@ from bbtc.tree.nodes import (
 
 
 def held_by(tree: Tree) -> Mapping[str, tuple[int, ...]]:
-    """By action: the variables that the tree reads as they were, from the tick that starts the action until it
-    ends. Actions that hold nothing are missing.
+    """By action: the variables that the tree reads as they were, from the tick that starts the action until
+    it ends. Actions that hold nothing are missing.
 
     What is read, by conditions and guards, only to the right of a node decides nothing while its action runs:
     a tick gets there only where it has passed the node by, and starts and ends nothing then. That is so but

@@ -531,7 +531,9 @@ def may_set(task: Task, action: GroundAction) -> frozenset[int]:
     """Every variable that an action may set while it runs, or make known: what it does to facts by itself
     never preempts it (docs/multi-tick-actions.md)."""
     return frozenset(
-        variable for effect in effects_of(apparent_factors(task, action)) for variable, _ in effect.sets
+        variable
+        for effect in effects_of((*apparent_factors(task, action), *action.on_abort))
+        for variable, _ in effect.sets
     )
 
 

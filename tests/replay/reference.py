@@ -253,7 +253,7 @@ def set_by(task: Task, action: GroundAction) -> set[int]:
                     found.update(names[variable] for variable, _ in effect.sets if variable in names)
                 look(outcome.factors, names)
 
-    look(action.factors, {number: number for number in range(len(task.variables))})
+    look(action.factors + action.on_abort, {number: number for number in range(len(task.variables))})
     for change in action.changes:
         facts = len(task.components[change.component].facts)
         look(change.factors, {facts + at: variable for at, variable in enumerate(change.seen)})

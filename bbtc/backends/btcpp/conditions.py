@@ -115,8 +115,8 @@ class ConditionWriter:
         return self._holding.ports(facts, args) if self._idioms.profile == "stock" else Ports(args)
 
     def notes(self, facts: Sequence[int], ports: Ports) -> list[Element]:
-        """Nodes that write down what facts are, for standard nodes. Where some facts of a predicate are about no
-        argument, all of them are written out, as they are for other arguments: such actions share a
+        """Nodes that write down what facts are, for standard nodes. Where some facts of a predicate are about
+        no argument, all of them are written out, as they are for other arguments: such actions share a
         BehaviorTree."""
         if self._idioms.profile != "stock":
             return []
