@@ -142,6 +142,12 @@ _CODES = (
     Code("BBT0430", "too much for the text of a partially observable process"),
     Code("BBT0431", "true world that cannot be", _WARNING),
     Code("BBT0432", "reading that tells nothing, or the contrary"),
+    Code("BBT0437", "range of a number"),
+    Code("BBT0438", "number without a bound"),
+    Code("BBT0439", "number outside its range at the start"),
+    Code("BBT0440", "use of numbers that cannot be told apart"),
+    Code("BBT0441", "numbers where they are not supported"),
+    Code("BBT0442", "comparison that can never hold", _WARNING),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

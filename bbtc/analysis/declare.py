@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from bbtc.analysis.names import Declared, Names, Signature
 from bbtc.diagnostics import Related, Report
-from bbtc.model.domain import Function, Predicate
+from bbtc.model.domain import Function, NumberRange, Predicate
 from bbtc.model.types import OBJECT, Object, Type, TypeHierarchy
 from bbtc.source import Span
 from bbtc.syntax import ast
@@ -231,11 +231,46 @@ def _functions(names: Names, domain: ast.Definition) -> None:
                     node.span,
                     "functions have numbers as values; use a predicate for objects",
                 )
-            function = Function(node.name.key, names.parameters(node.parameters), node.name.span)
+            function = Function(
+                node.name.key,
+                names.parameters(node.parameters),
+                node.name.span,
+                None if node.range is None else _range(names, node.name, node.range),
+            )
             before = names.functions.setdefault(node.name.key, function)
             if before is not function:
                 same = [p.types for p in before.parameters] == [p.types for p in function.parameters]
                 twice(names.report, "function", node.name, before, harmless=same)
+
+
+MOST_VALUES = 2**31
+"""So many values a number may have, and so large may they be."""
+
+
+def _range(names: Names, name: ast.Name, node: ast.NumberRange) -> NumberRange | None:
+    """A declared range; None after an error."""
+    for bound in (node.low, node.high):
+        if bound.value.denominator != 1:
+            message = f"the range of `{name.text}` goes from one whole number to another, not to {bound.text}"
+            names.report.error("BBT0437", message, bound.span)
+            return None
+        if abs(bound.value) > MOST_VALUES:
+            message = f"the bound {bound.text} of `{name.text}` is too large"
+            names.report.error("BBT0437", message, bound.span, "numbers stay within 2^31")
+            return None
+    low, high = int(node.low.value), int(node.high.value)
+    if low > high:
+        message = f"the range of `{name.text}` is empty: {low} is above {high}"
+        names.report.error("BBT0437", message, node.span, f"write `(int {high} {low})`")
+        return None
+    policy = None if node.policy is None else node.policy.key
+    if policy not in (None, ":block", ":saturate"):
+        assert node.policy is not None
+        message = f"`{node.policy.text}` does not say what happens at the bounds of `{name.text}`"
+        hint = "`:saturate`, the default, stays at the bound; with `:block` the action does not start"
+        names.report.error("BBT0437", message, node.policy.span, hint)
+        return None
+    return NumberRange(low, high, policy == ":block", span=node.span)
 
 
 def _fluents(names: Names, problem: ast.Definition | None) -> None:

@@ -19,9 +19,18 @@ from bbtc.artefacts.cursor import At, Faults, clip, run_reader
 from bbtc.artefacts.hidden_json import component_to_json, observation_to_json, true_world, true_world_to_json
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
+from bbtc.artefacts.numbers_json import (
+    changes_from_json,
+    changes_to_json,
+    digits_from_json,
+    digits_of_value,
+    number_to_json,
+    without_digits,
+)
 from bbtc.artefacts.prior_json import check_sum, prior_from_json
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
+from bbtc.ground.numbers.occurrences import with_digit_effects
 from bbtc.ground.task import (
     Body,
     BodyAction,
@@ -37,13 +46,16 @@ from bbtc.ground.task import (
     GroundTemplate,
     InitialState,
     Knowledge,
+    NumberVariable,
     Observation,
     Outcome,
     Signature,
     Task,
     Variable,
     ground_name,
+    numbers_of,
     split_name,
+    values_in_words,
 )
 from bbtc.kleene import Truth
 from bbtc.source import SourceFile
@@ -73,11 +85,13 @@ def task_to_json(task: Task) -> Json:
         value["goal_reward"] = given_text(task.goal_reward)
     if task.metric != "cost":
         value["metric"] = task.metric
-    value["variables"] = [_variable_to_json(variable) for variable in task.variables]
+    value["variables"] = [_variable_to_json(each) for each in task.variables if each.digit is None]
+    if task.numbers:
+        value["numbers"] = [number_to_json(number) for number in task.numbers]
     value["initial"] = [
         {
             "p": given_text(state.probability),
-            "assign": {v.name: truth.word for v, truth in zip(task.variables, state.values, strict=True)},
+            "assign": values_in_words(task.variables, state.values),
         }
         for state in task.initial
     ]
@@ -156,6 +170,11 @@ def _outcome_to_json(outcome: Outcome, variables: Sequence[Variable]) -> Json:
         value["cost"] = given_text(outcome.cost)
     if outcome.charges:
         value["charges"] = [_charge_to_json(charge, variables) for charge in outcome.charges]
+    if outcome.changes:
+        # What they do to digits is worked out again when they are read.
+        shown = without_digits(outcome.effects, variables)
+        value["effects"] = [_effect_to_json(effect, variables) for effect in shown]
+        value["numbers"] = changes_to_json(outcome.changes, variables)
     return value
 
 
@@ -242,6 +261,7 @@ def read_task(at: At, faults: Faults) -> Task:
     members = at.members(
         ["format", "version", "domain", "problem", "variables", "initial", "goal", "actions"],
         [
+            "numbers",
             "goal_probability",
             "goal_reward",
             "metric",
@@ -253,6 +273,8 @@ def read_task(at: At, faults: Faults) -> Task:
         ],
     )
     variables = faults.each(members["variables"].elements(), _variable)
+    for digits in faults.each(_optional(members, "numbers"), digits_from_json):
+        variables += digits
     faults.stop_if_any()  # every mention of a variable would be a fault of its own
     variables.sort(key=lambda variable: variable.name)
     _check_distinct(members["variables"], [variable.name for variable in variables])
@@ -348,9 +370,9 @@ def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
 
 def _signature(at: At) -> Signature:
     members = at.members(["kind", "symbol", "parameters"])
-    kind: Literal["predicate", "action"] = (
-        "action" if members["kind"].word("predicate", "action") == "action" else "predicate"
-    )
+    kinds: Mapping[str, Literal["predicate", "action", "function"]]
+    kinds = {"predicate": "predicate", "action": "action", "function": "function"}
+    kind = kinds[members["kind"].word(*kinds)]
     return Signature(kind, members["symbol"].string(), members["parameters"].strings())
 
 
@@ -360,13 +382,15 @@ class _Reader:
 
     variables: tuple[Variable, ...]
     index: Mapping[str, int]
+    numbers: Mapping[str, NumberVariable]
     components: tuple[Component, ...] = ()
 
     @classmethod
     def of(cls, variables: Iterable[Variable]) -> _Reader:
         """For some variables."""
         listed = tuple(variables)
-        return cls(listed, {variable.name: number for number, variable in enumerate(listed)})
+        index = {variable.name: number for number, variable in enumerate(listed)}
+        return cls(listed, index, {number.name: number for number in numbers_of(listed)})
 
     def component(self, at: At) -> Component:
         members = at.members(["facts", "prior", "known"], ["seen", "first"])
@@ -421,7 +445,7 @@ class _Reader:
         return Change(number, seen, local.chance(at, members), observations)
 
     def condition(self, at: At) -> Condition:
-        return condition_from_json(at, self.index)
+        return condition_from_json(at, self.index, self.numbers)
 
     def initial_state(self, at: At) -> InitialState:
         members = at.members(["p", "assign"])
@@ -435,6 +459,9 @@ class _Reader:
     def _assignment(self, at: At) -> dict[int, Truth]:
         values: dict[int, Truth] = {}
         for name, value in at.entries():
+            if name in self.numbers:
+                values.update(digits_of_value(value, self.numbers[name]))
+                continue
             variable = number_of(value, name, self.index)
             truth = Truth.from_word(value.word("true", "false", "unknown"))
             if truth is Truth.UNKNOWN and not self.variables[variable].three_valued:
@@ -476,10 +503,10 @@ class _Reader:
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:
-        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges"])
+        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges", "numbers"])
         if depth > MAX_NESTING:
             raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
-        return Outcome(
+        outcome = Outcome(
             members["p"].given_probability(zero=False),
             tuple(self._effect(element) for element in members["effects"].elements()),
             self.chance(at, members, depth + 1) if "factors" in members or "oneof" in members else (),
@@ -487,6 +514,11 @@ class _Reader:
             members["cost"].given() if "cost" in members else _ZERO,
             tuple(self._charge(element) for element in _optional(members, "charges")),
         )
+        if "numbers" not in members:
+            return outcome
+        changes = changes_from_json(members["numbers"], self.numbers, self.condition)
+        sizes = {number.digits: number.high - number.low + 1 for number in self.numbers.values()}
+        return with_digit_effects(replace(outcome, changes=changes), sizes)
 
     def _charge(self, at: At) -> Charge:
         members = at.members(["when"], ["cost", "reward"])

@@ -25,13 +25,24 @@ from itertools import repeat
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
-from bbtc.ground.condition import FALSE, TRUE, Condition
+from bbtc.ground.condition import FALSE, TRUE, Condition, conjunction
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
 from bbtc.ground.normal import Block, Chance, groups, reads
+from bbtc.ground.numbers.changes import Changes, Changing
 from bbtc.ground.reachability.atoms import Atoms, Scope
 from bbtc.ground.reachability.bulk import Shared
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
-from bbtc.ground.task import ONE, ZERO, Charge, Effect, Factor, Outcome, merge_outcomes, outcomes_of
+from bbtc.ground.task import (
+    ONE,
+    ZERO,
+    Charge,
+    Effect,
+    Factor,
+    NumberChange,
+    Outcome,
+    merge_outcomes,
+    outcomes_of,
+)
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
@@ -51,10 +62,11 @@ class _Part:
     reward: Fraction = ZERO
     charges: dict[Condition, tuple[Fraction, Fraction]] = field(default_factory=dict)
     factors: list[Factor] = field(default_factory=list)
+    changes: list[NumberChange] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         """Does anything happen, further draws aside?"""
-        return bool(self.sets or self.cost or self.reward or self.charges)
+        return bool(self.sets or self.cost or self.reward or self.charges or self.changes)
 
     def add(self, guard: Condition, cost: Fraction, reward: Fraction) -> None:
         """Add to cost and reward where the guard is true."""
@@ -77,7 +89,8 @@ class _Part:
     def outcome(self, probability: Fraction, factors: tuple[Factor, ...]) -> Outcome:
         """All of it as one outcome, with further draws."""
         charges = tuple(Charge(guard, cost, reward) for guard, (cost, reward) in self.charges.items())
-        return Outcome(probability, self.effects(), factors, self.reward, self.cost, charges)
+        changes = tuple(self.changes)
+        return Outcome(probability, self.effects(), factors, self.reward, self.cost, charges, changes)
 
     def effects(self) -> tuple[Effect, ...]:
         """The settings as effects, unconditional ones first, in order of variables."""
@@ -168,6 +181,7 @@ class EffectLowering:
         self.lowering = lowering
         self.atoms: Atoms = lowering.atoms
         self.report = report
+        self.changes = Changes(lowering.amounts, report)
 
     def reached(
         self, block: Block, parameters: tuple[Parameter, ...], span: Span | None
@@ -209,10 +223,12 @@ class LoweredEffect:
                         always.append(leaf)
                     case me.Set(predicate, args, value):
                         leaves.append(_Setting(lowering.number(predicate, args, frame), value))
-                    case me.Add(to="cost") if loop.trivial:
+                    case me.Add(to="cost") if loop.trivial and not owner.changes.depends(leaf.amount):
                         self._costs.append(_Addition(owner, leaf, frame))
                     case me.Add():
                         leaves.append(_Addition(owner, leaf, frame))
+                    case me.Change():
+                        leaves.append(Changing(owner.changes, leaf, frame.rows))
                     case _:
                         assert_never(leaf)
             if leaves:
@@ -252,7 +268,7 @@ class LoweredEffect:
         """
         part = self.part(env, [])
         cost, part.cost = part.cost, ZERO
-        factors = _arranged(part)
+        factors = self._owner.changes.settled(_arranged(part), self._span)
         for outcome in outcomes_of(factors):
             charged = (number for charge in outcome.charges for number in (charge.cost, charge.reward))
             for number in (outcome.probability, outcome.cost, outcome.reward, *charged):
@@ -285,9 +301,13 @@ class LoweredEffect:
         for always in self._always.numbers(env):
             yield always, above
         for loop, leaves in self._groups:
-            setters = [leaf for leaf in leaves if isinstance(leaf, _Setting)]
+            setters = [leaf for leaf in leaves if isinstance(leaf, _Setting | Changing)]
             for conditions in loop.guards(env, above):
                 for leaf in setters:
+                    if isinstance(leaf, Changing):
+                        more = [*conditions, *leaf.read(env)]
+                        yield from ((digit, more) for digit in leaf.digits(env))
+                        continue
                     number = leaf.number(env)
                     if number is not None:
                         yield number, conditions
@@ -295,12 +315,25 @@ class LoweredEffect:
             yield from chance.settings(env, above)
 
     def charged(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
-        """The conditions under which something is added to cost or reward."""
+        """The conditions under which something is added to cost or reward, or that keep the action from
+        starting since a number would leave its range."""
         if self._costs and above:
             yield above
         for loop, leaves in self._groups:
-            if any(isinstance(leaf, _Addition) for leaf in leaves):
-                yield from loop.guards(env, above)
+            if any(isinstance(leaf, _Addition | Changing) for leaf in leaves):
+                for conditions in loop.guards(env, above):
+                    read = [
+                        part
+                        for leaf in leaves
+                        for part in (
+                            leaf.read(env, blocking=True)
+                            if isinstance(leaf, Changing)
+                            else leaf.read(env)
+                            if isinstance(leaf, _Addition)
+                            else ()
+                        )
+                    ]
+                    yield [*conditions, *read]
         for chance in self._chances:
             yield from chance.charged(env, above)
 
@@ -316,7 +349,10 @@ class LoweredEffect:
             for conditions in loop.guards(env, above):
                 guard = conjoin(conditions)
                 for leaf in leaves:
-                    leaf.run(part, env, guard)
+                    if isinstance(leaf, Changing):
+                        part.changes += leaf.made(env, guard)
+                    else:
+                        leaf.run(part, env, guard)
         for chance in self._chances:
             part.draw(chance.factors(env, above))
         return part
@@ -347,22 +383,36 @@ class _Addition:
     def __init__(self, owner: EffectLowering, leaf: me.Add, frame: Frame) -> None:
         self._owner = owner
         self._leaf = leaf
-        self._value = _Amounts(owner, frame).lower(leaf.amount)
+        self._depends = owner.changes.depends(leaf.amount)
+        self._value = None if self._depends else _Amounts(owner, frame).lower(leaf.amount)
+        self._cases = owner.changes.cases(leaf.amount, frame.rows, leaf.span) if self._depends else None
 
     def amount(self, env: Env) -> Fraction:
-        """What is added, with its sign."""
+        """What is added, with its sign; for one that depends on no number of the state."""
+        assert self._value is not None
         value = self._value(env)
         return value if self._leaf.sign == 1 else self._leaf.sign * value
 
+    def read(self, env: Env) -> Iterator[Condition]:
+        """Conditions that read all numbers which the amount depends on."""
+        return iter(()) if self._cases is None else (condition for condition, _ in self._cases(env))
+
     def run(self, part: _Part, env: Env, guard: Condition) -> None:
         """Count it where the guard is true."""
-        leaf, amount = self._leaf, self._owner.short(self.amount(env), self._leaf.span)
+        if self._cases is None:
+            self._count(part, guard, self.amount(env))
+            return
+        for condition, value in self._cases(env):
+            self._count(part, conjunction([guard, condition]), self._leaf.sign * value)
+
+    def _count(self, part: _Part, guard: Condition, value: Fraction) -> None:
+        leaf, amount = self._leaf, self._owner.short(value, self._leaf.span)
         part.add(guard, *((amount, ZERO) if leaf.to == "cost" else (ZERO, amount)))
         for total in (part.cost, part.reward, *part.charges.get(guard, ())):
             self._owner.short(total, leaf.span)
 
 
-_Leaf = _Setting | _Addition
+_Leaf = _Setting | _Addition | Changing
 
 
 class _LoweredChance:
@@ -475,12 +525,13 @@ def _absorb(part: _Part, outcome: Outcome) -> None:
     for charge in outcome.charges:
         part.add(charge.when, charge.cost, charge.reward)
     part.factors.extend(outcome.factors)
+    part.changes.extend(outcome.changes)
 
 
 def _join(part: _Part, outcome: Outcome) -> Outcome:
     """The outcome with everything that is certain beside it (rule 8)."""
     sets = {guard: dict(sets) for guard, sets in part.sets.items()}
-    both = _Part(sets, part.cost, part.reward, dict(part.charges))
+    both = _Part(sets, part.cost, part.reward, dict(part.charges), changes=list(part.changes))
     _absorb(both, outcome)
     return both.outcome(outcome.probability, tuple(both.factors))
 

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
-from bbtc.ground.condition import Condition
+from bbtc.ground.condition import Condition, number_in
 from bbtc.kleene import Truth
 from bbtc.source import Span
 
@@ -39,13 +39,46 @@ def unused_name(name: str, taken: Collection[str]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class Digit:
+    """Which binary digit of which number a variable is: that of the value 2 to the ``place``, counted from
+    ``low``, the least value of ``function`` for the variable's arguments."""
+
+    function: str
+    place: int
+    low: int
+    high: int
+    blocks: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class NumberVariable:
+    """A whole number from ``low`` to ``high``, kept in ``digits``: two-valued variables, the least first,
+    which count from ``low``. Actions that may leave the range do not start where it ``blocks``; else it
+    stays at its bounds."""
+
+    function: str
+    args: tuple[str, ...]
+    low: int
+    high: int
+    blocks: bool
+    digits: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """``function(arg,…)``."""
+        return ground_name(self.function, self.args)
+
+
+@dataclass(frozen=True, slots=True)
 class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown."""
+    """One ground predicate. ``three_valued`` if anything in the task can make it unknown. Of a number it is a
+    ``digit``, which is true where it is 1."""
 
     predicate: str
     args: tuple[str, ...]
     three_valued: bool
     hidden: bool = False
+    digit: Digit | None = None
     span: Span | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -77,12 +110,33 @@ class Charge:
 
 
 @dataclass(frozen=True, slots=True)
+class Case:
+    """What a number becomes where ``when`` is true before the action (None: always): the ``amount``, counted
+    from the number's least value, or that much more than it was, no further than to its bounds."""
+
+    when: Condition | None
+    kind: Literal["assign", "add"]
+    amount: int
+
+
+@dataclass(frozen=True, slots=True)
+class NumberChange:
+    """What happens to the number with these digits: at most one of the cases is so."""
+
+    digits: tuple[int, ...]
+    cases: tuple[Case, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """One thing that may happen, with its probability within its factor.
 
     ``factors`` are further independent choices made if this outcome happens (chance nested in
     a branch). ``reward`` is what the outcome adds to the reward fluent, ``cost`` what it adds to the
     action's cost; ``charges`` add to both under conditions.
+
+    ``changes`` tell what happens to numbers, each of which has at most one in what happens at once. The
+    effects do the same to their digits: whoever reads changes leaves out what effects set of digits.
     """
 
     probability: Fraction
@@ -91,6 +145,7 @@ class Outcome:
     reward: Fraction = Fraction(0)
     cost: Fraction = Fraction(0)
     charges: tuple[Charge, ...] = ()
+    changes: tuple[NumberChange, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +330,7 @@ class Signature:
     """The parameter names of a predicate or an action schema, as declared, without ``?``. They name
     the ports and arguments of exported leaves; where a task has none, exporters number them."""
 
-    kind: Literal["predicate", "action"]
+    kind: Literal["predicate", "action", "function"]
     symbol: str
     parameters: tuple[str, ...]
 
@@ -333,6 +388,21 @@ class Task:
         return {variable.name: index for index, variable in enumerate(self.variables)}
 
     @cached_property
+    def numbers(self) -> tuple[NumberVariable, ...]:
+        """The numbers, in the order of their first digits."""
+        return numbers_of(self.variables)
+
+    @cached_property
+    def number_by_name(self) -> dict[str, NumberVariable]:
+        """Each number by its name."""
+        return {number.name: number for number in self.numbers}
+
+    @cached_property
+    def number_of_digit(self) -> dict[int, NumberVariable]:
+        """By variable that is a digit: its number."""
+        return {digit: number for number in self.numbers for digit in number.digits}
+
+    @cached_property
     def action_by_name(self) -> dict[str, GroundAction]:
         """Each action by its ground name."""
         return {action.name: action for action in self.actions}
@@ -359,6 +429,53 @@ class Task:
         return {template.name: template for template in self.templates}
 
 
+def numbers_of(variables: Sequence[Variable]) -> tuple[NumberVariable, ...]:
+    """The numbers that some variables are the digits of, in the order of their first digits."""
+    found: dict[tuple[str, tuple[str, ...]], list[int]] = {}
+    for index, variable in enumerate(variables):
+        if variable.digit is not None:
+            found.setdefault((variable.digit.function, variable.args), []).append(index)
+    made = []
+    for (function, args), indices in found.items():
+        placed = sorted((digit.place, index, digit) for index, digit in _digits(variables, indices))
+        _, _, digit = placed[0]
+        digits = tuple(index for _, index, _ in placed)
+        made.append(NumberVariable(function, args, digit.low, digit.high, digit.blocks, digits))
+    return tuple(made)
+
+
+def digit_name(function: str, place: int) -> str:
+    """The predicate of a digit of the numbers of a function; no file can name it."""
+    return f"{function} digit {place}"
+
+
+def values_in_words(variables: Sequence[Variable], values: Sequence[int]) -> dict[str, str | int]:
+    """The value of each variable, and of each number, by name, in the order of the variables."""
+    numbers = {number.digits[0]: number for number in numbers_of(variables)}
+    found: dict[str, str | int] = {}
+    for index, (variable, value) in enumerate(zip(variables, values, strict=False)):
+        if variable.digit is None:
+            found[variable.name] = Truth(value).word
+        elif index in numbers:
+            found[numbers[index].name] = numbers[index].low + number_in(numbers[index].digits, values)
+    return found
+
+
+def differences(
+    variables: Sequence[Variable], before: Sequence[int], after: Sequence[int]
+) -> dict[str, str | int]:
+    """What differs between two states, with its value in the second."""
+    one, other = values_in_words(variables, before), values_in_words(variables, after)
+    return {name: value for name, value in other.items() if one[name] != value}
+
+
+def _digits(variables: Sequence[Variable], indices: Iterable[int]) -> Iterator[tuple[int, Digit]]:
+    for index in indices:
+        digit = variables[index].digit
+        if digit is not None:
+            yield index, digit
+
+
 ZERO = Fraction(0)
 ONE = Fraction(1)
 NO_CHANGE = Factor((Outcome(ONE, ()),))
@@ -376,7 +493,10 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     """Outcomes that do the same made one, with the sum of their probabilities."""
     merged: dict[tuple[object, ...], Outcome] = {}
     for outcome in outcomes:
-        key = (outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges)
+        key = (
+            *(outcome.effects, outcome.factors, outcome.reward),
+            *(outcome.cost, outcome.charges, outcome.changes),
+        )
         before = merged.get(key)
         if before is not None:
             total = before.probability + outcome.probability

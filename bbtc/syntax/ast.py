@@ -14,11 +14,13 @@ from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
 from bbtc.syntax.terms import Arithmetic as Arithmetic
 from bbtc.syntax.terms import Atom as Atom
+from bbtc.syntax.terms import Comparison as Comparison
 from bbtc.syntax.terms import Empty as Empty
 from bbtc.syntax.terms import Equality as Equality
 from bbtc.syntax.terms import FluentRef as FluentRef
 from bbtc.syntax.terms import Name as Name
 from bbtc.syntax.terms import Number as Number
+from bbtc.syntax.terms import NumberRange as NumberRange
 from bbtc.syntax.terms import NumericExpression as NumericExpression
 from bbtc.syntax.terms import Term as Term
 from bbtc.syntax.terms import TypedGroup as TypedGroup
@@ -92,7 +94,7 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class Unsupported:
-    """A construct that is recognised and refused by name (numeric comparison, preference, …)."""
+    """A construct that is recognised and refused by name (preference, object fluent, …)."""
 
     construct: str
     text: str
@@ -100,7 +102,7 @@ class Unsupported:
 
 
 Formula: TypeAlias = (
-    Atom | Empty | Equality | Not | And | Or | Imply | Quantified | Believed | Test | Unsupported
+    Atom | Empty | Equality | Comparison | Not | And | Or | Imply | Quantified | Believed | Test | Unsupported
 )
 
 
@@ -268,12 +270,13 @@ class Predicates:
 
 @dataclass(frozen=True, slots=True)
 class FunctionDeclaration:
-    """``(name params) - type`` within ``:functions``."""
+    """``(name params) - type`` within ``:functions``, or with a range as its type."""
 
     name: Name
     parameters: TypedList
     types: tuple[Name, ...]
     span: Span = span_field()
+    range: NumberRange | None = None
 
 
 @dataclass(frozen=True, slots=True)

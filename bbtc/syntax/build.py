@@ -37,6 +37,13 @@ class Types(NamedTuple):
     span: Span
 
 
+class NumberRange(NamedTuple):
+    """``- (int low high)`` behind a function, with what it spans."""
+
+    range: ast.NumberRange
+    span: Span
+
+
 class DerivedHead(NamedTuple):
     """``(name params)`` of a derived fact."""
 
@@ -213,12 +220,22 @@ class Builder(Expressions):
         return ast.Functions(tuple(declarations), head.to(close))
 
     def function(
-        self, head: Token, parameters: ast.TypedList, close: Token, types: Types | None = None
+        self,
+        head: Token,
+        parameters: ast.TypedList,
+        close: Token,
+        types: Types | NumberRange | None = None,
     ) -> _Function:
         return _function(next(leaves.names(head)), parameters, head.to(close), types)
 
-    def function_bare(self, name: Token, types: Types | None = None) -> _Function:
+    def function_bare(self, name: Token, types: Types | NumberRange | None = None) -> _Function:
         return _function(leaves.name(name), (), name.span, types)
+
+    def number_range(self, dash: Token, head: Token, low: Token, high: Token, *rest: Token) -> NumberRange:
+        policy = leaves.name(rest[0]) if len(rest) > 1 else None
+        span = head.to(rest[-1])
+        given = ast.NumberRange(self.number(low), self.number(high), policy, span)
+        return NumberRange(given, dash.to(rest[-1]))
 
     # --- actions and the like ----------------------------------------------------------------
 
@@ -496,11 +513,15 @@ def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: b
     return ast.PredicateDeclaration(leaves.declared("predicate", name), parameters, unknown, span)
 
 
-def _function(name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | None) -> _Function:
+def _function(
+    name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | NumberRange | None
+) -> _Function:
     declared = leaves.declared("function", name)
     if types is None:
         return ast.FunctionDeclaration(declared, parameters, (), span)
     whole = Span(span.source, span.start, types.span.end)
+    if isinstance(types, NumberRange):
+        return ast.FunctionDeclaration(declared, parameters, (), whole, types.range)
     return ast.FunctionDeclaration(declared, parameters, types.names, whole)
 
 

@@ -25,7 +25,7 @@ from bbtc.backends.btcpp.names import BtcppNames, TreeIds, is_numeric, ports_for
 from bbtc.backends.interface import variable_symbol
 from bbtc.backends.names import Symbol
 from bbtc.backends.shape import can_be_unknown, words_of
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, in_digits, variables
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 
@@ -51,7 +51,7 @@ class ConditionWriter:
                 return sum(can_be_unknown(self._task, part) for part in parts) > 1 or any(
                     self.uses_register(part) for part in parts
                 )
-            case Is() | Known() | Not() | Constant():
+            case Is() | Known() | Within() | Not() | Constant():
                 return False
             case _:
                 assert_never(condition)
@@ -70,7 +70,7 @@ class ConditionWriter:
         match condition:
             case Is(_, Truth.TRUE) | Constant():
                 pass
-            case Is() | Known() | Not() | And() | Or():
+            case Is() | Known() | Within() | Not() | And() | Or():
                 # A SubTree says all in its tag, and its name would have to be unique.
                 if element.tag != "SubTree":
                     element.set("name", self.label(condition, binding))
@@ -124,6 +124,8 @@ class ConditionWriter:
                 return word + self._names.plain[variable_symbol(self._task.variables[variable])]
             case Known(variable):
                 return "Known" + self._names.plain[variable_symbol(self._task.variables[variable])]
+            case Within():
+                return "Number"
             case Not(part):
                 return "Not" + self._title(part)
             case And(parts):
@@ -145,6 +147,8 @@ class ConditionWriter:
                 return self._test("unknown", variable, binding)
             case Known(variable):
                 return self._test("known", variable, binding)
+            case Within():
+                return self._kleene(in_digits(condition), binding)
             case Not(part):
                 return decorated("Inverter", self._kleene(part, binding))
             case And(parts):

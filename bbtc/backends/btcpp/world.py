@@ -10,7 +10,7 @@ from bbtc.backends.btcpp.monitor import MonitorTable, braces, key_code, key_of
 from bbtc.backends.btcpp.names import BtcppNames
 from bbtc.backends.interface import Leaf, action_symbol, variable_symbol
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
-from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
 from bbtc.ground.task import Factor, Outcome
 from bbtc.kleene import Truth
 from bbtc.tree.monitor import Monitor, Telling, Walk
@@ -188,6 +188,8 @@ class SimulatedRobotWriter:
                 return f"is_unknown(s[{self._number[variable]}])"
             case Known(variable):
                 return f"is_known(s[{self._number[variable]}])"
+            case Within():
+                return self._test(in_digits(condition))
             case And(parts):
                 return f"all_of({braces(map(self._test, parts))})"
             case Or(parts):

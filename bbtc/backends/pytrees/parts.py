@@ -8,7 +8,7 @@ from typing_extensions import assert_never
 
 from bbtc.backends.interface import Leaf
 from bbtc.backends.pytrees.pycode import Code, call, flat, layout, literal
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
 from bbtc.ground.task import Variable
 from bbtc.kleene import Truth
 
@@ -33,6 +33,8 @@ class ConditionCode:
                 return f"{flat(read(variable))} is None"
             case Known(variable):
                 return f"{flat(read(variable))} is not None"
+            case Within():
+                return self.write(in_digits(condition), read)
             case And(parts):
                 return self._helper("all_of", *(self.write(part, read) for part in parts))
             case Or(parts):

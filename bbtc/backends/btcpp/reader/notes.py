@@ -138,7 +138,7 @@ def _exact(task: Task, node: Node, note: Mapping[str, object]) -> Node:
         node = replace(node, template=template)
     if isinstance(node, ConditionNode) and "condition" in note:
         try:
-            condition = condition_from_json(At(note["condition"]), task.variable_index)
+            condition = condition_from_json(At(note["condition"]), task.variable_index, task.number_by_name)
         except Unreadable:
             return node
         if written(task, condition) == node.condition:
