@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
+from fractions import Fraction
 from typing import TypeVar
 
 from bbtc.analysis.names import Declared, Names, Signature
@@ -291,7 +292,39 @@ def _fluents(names: Names, problem: ast.Definition | None) -> None:
             elif metric.direction == "maximize" and key not in costs:
                 counted = (counted - rewards) | {key}
                 rewards.add(key)
+        elif metric.direction == "minimize" and (terms := weighted(metric.expression, rewards)) is not None:
+            if "total-time" not in names.functions:
+                names.per_action = terms.pop("total-time", Fraction(0))
+            costs |= terms.keys()
+            counted = (counted - costs) | {key for key, weight in terms.items() if weight}
+            names.weights = terms
     names.costs, names.rewards, names.counted = frozenset(costs), frozenset(rewards), frozenset(counted)
+
+
+def weighted(
+    expression: ast.NumericExpression, others: Container[str] = frozenset()
+) -> dict[str, Fraction] | None:
+    """A sum of fluents without arguments, none of them among ``others``, each with its weight, which is not
+    below 0; None for what is no such sum."""
+    found: dict[str, Fraction] = {}
+    match expression:
+        case ast.FluentRef(name, ()) if name.key not in others and name.key not in GOAL_FLUENTS:
+            return {name.key: Fraction(1)}
+        case ast.Arithmetic("+", operands):
+            for operand in operands:
+                terms = weighted(operand, others)
+                if terms is None:
+                    return None
+                for key, weight in terms.items():
+                    found[key] = found.get(key, Fraction(0)) + weight
+            return found
+        case ast.Arithmetic("*", (ast.Number() as number, other) | (other, ast.Number() as number)):
+            terms = weighted(other, others)
+            if terms is None or number.value < 0:
+                return None
+            return {key: number.value * weight for key, weight in terms.items()}
+        case _:
+            return None
 
 
 def _actions(names: Names, nodes: list[ast.Action]) -> None:

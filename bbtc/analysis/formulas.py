@@ -348,6 +348,9 @@ def _fluent_effect(names: Names, node: ast.FluentEffect, scope: Scope) -> me.Eff
     if found is None or key not in names.counted:
         return me.NOTHING
     sign = 1 if node.operator == "increase" else -1
+    weight = names.weights.get(key, Fraction(1))
+    if weight != 1:
+        found = me.Arithmetic("*", (me.Constant(weight), found), node.span)
     return me.Add("cost" if to == "cost" else "reward", found, sign, node.span)
 
 

@@ -136,6 +136,8 @@ class _Fixpoint:
         self._doings = [each for each in doings if each.change.function in open_]
         self._changing = {each.change.function for each in doings}
         self._intervals: dict[str, Interval] = {}
+        self._blamed: dict[tuple[str, bool], _Doing] = {}
+        """By number, and whether it falls: the change that moves its end, round after round."""
         values: dict[str, list[Fraction]] = {}
         for (name, _), value in model.init.numbers.items():
             values.setdefault(name, []).append(value)
@@ -171,12 +173,22 @@ class _Fixpoint:
         for round_ in range(_EXACT_ROUNDS + 2 * len(first) + 2):
             new = self._stepped(self._intervals)
             if new == self._intervals:
-                return
+                break
             if round_ >= _EXACT_ROUNDS:
+                self._blame(new)
                 new = {name: _widened(self._intervals[name], each) for name, each in new.items()}
             self._intervals = new
         for _ in range(_EXACT_ROUNDS):
             self._intervals = self._stepped(first)
+
+    def _blame(self, new: Mapping[str, Interval]) -> None:
+        """Note which changes move the ends of intervals."""
+        for doing in self._doings:
+            name, after = doing.change.function, self._after(doing)
+            if after is not None and after[0] == new[name][0] < self._intervals[name][0]:
+                self._blamed.setdefault((name, True), doing)
+            if after is not None and after[1] == new[name][1] > self._intervals[name][1]:
+                self._blamed.setdefault((name, False), doing)
 
     def _stepped(self, base: Mapping[str, Interval]) -> dict[str, Interval]:
         """Some intervals with what the changes may lead to from the present ones."""
@@ -190,19 +202,23 @@ class _Fixpoint:
 
     def _refuse(self, name: str, *, falls: bool, report: Report) -> None:
         """Report the first change that a number has no bound for."""
-        change = next(
-            doing.change
-            for doing in self._doings
-            if doing.change.function == name
-            and (new := self._after(doing)) is not None
-            and (new[0] == -inf if falls else new[1] == inf)
-        )
+        change = (self._blamed.get((name, falls)) or self._endless(name, falls=falls)).change
         shown = f"{change.operator} ({' '.join((name, *change.args))})"
         message = f"`{shown}` changes `{name}` {'downwards' if falls else 'upwards'} without a bound"
         hint = (
             f"declare its range in `:functions`: `({name} …) - (int 0 100)`; or let a precondition bound it"
         )
         report.error("BBT0438", message, change.span, hint)
+
+    def _endless(self, name: str, *, falls: bool) -> _Doing:
+        """A change of a number that may lead anywhere."""
+        return next(
+            doing
+            for doing in self._doings
+            if doing.change.function == name
+            and (after := self._after(doing)) is not None
+            and (after[0] == -inf if falls else after[1] == inf)
+        )
 
     def _after(self, doing: _Doing) -> Interval | None:
         """What a change may lead to; None where it never happens."""
