@@ -26,54 +26,56 @@ def _task(actions: str, condition: str = "(= (x) 3)", functions: str = "") -> bb
     return bbtc.compile(SourceFile("d.pddl", text))
 
 
+def _doing(condition: str, effect: str, name: str = "a") -> str:
+    """An action of one parameter."""
+    return f"(:action {name} :parameters (?s) :precondition {condition} :effect {effect})"
+
+
+_COUNTING = _doing("(< (y) 5)", "(increase (y) 1)")
+
+
 @pytest.mark.parametrize(
     ("actions", "low", "high"),
     [
         # A bound of the number itself: the step before it may lead beyond.
-        ("(:action a :precondition (< (x) 9) :effect (increase (x) 2))", 3, 11),
-        ("(:action a :precondition (>= (x) 1) :effect (decrease (x) 1))", 0, 3),
+        (_doing("(< (x) 9)", "(increase (x) 2)"), 3, 11),
+        (_doing("(>= (x) 1)", "(decrease (x) 1)"), 0, 3),
         # A bound of what comes of it.
-        ("(:action a :parameters (?s) :precondition (>= (x) (step ?s)) :effect (decrease (x) (step ?s)))", 0, 3),
-        ("(:action a :parameters (?s) :precondition (<= (+ (x) (step ?s)) 10) :effect (increase (x) (step ?s)))", 3, 10),
-        ("(:action a :precondition (not (< (x) 2)) :effect (decrease (x) 2))", 0, 3),
+        (_doing("(>= (x) (step ?s))", "(decrease (x) (step ?s))"), 0, 3),
+        (_doing("(<= (+ (x) (step ?s)) 10)", "(increase (x) (step ?s))"), 3, 10),
+        (_doing("(not (< (x) 2))", "(decrease (x) 2)"), 0, 3),
         # A bound of a guard.
-        ("(:action a :effect (when (> 6 (x)) (increase (x) 1)))", 3, 7),
+        (_doing("(and)", "(when (> 6 (x)) (increase (x) 1))"), 3, 7),
         # Assigned values.
-        ("(:action a :parameters (?s) :effect (assign (x) (* 5 (step ?s))))", 3, 20),
-        ("(:action a :effect (scale-up (x) 0))", 0, 3),
+        (_doing("(and)", "(assign (x) (* 5 (step ?s)))"), 3, 20),
+        (_doing("(and)", "(scale-up (x) 0)"), 0, 3),
         # One number bounds the other.
-        (
-            "(:action a :precondition (< (y) 5) :effect (increase (y) 1))"
-            "(:action b :effect (assign (x) (- (y) 2)))",
-            -2,
-            4,
-        ),
+        (_COUNTING + _doing("(and)", "(assign (x) (- (y) 2))", "b"), -2, 4),
         # What never happens widens nothing.
-        ("(:action a :precondition (> (x) 100) :effect (increase (x) 1)) (:action b :effect (assign (x) 4))", 3, 4),
+        (_doing("(> (x) 100)", "(increase (x) 1)") + _doing("(and)", "(assign (x) 4)", "b"), 3, 4),
         # Many steps are not counted one by one.
-        ("(:action a :precondition (<= (x) 1000000) :effect (increase (x) 1))", 3, 1000001),
+        (_doing("(<= (x) 1000000)", "(increase (x) 1)"), 3, 1000001),
     ],
-)  # fmt: skip
+)
 def test_a_range_follows_from_the_problem(actions: str, low: int, high: int) -> None:
     (number,) = [each for each in _task(actions).numbers if each.function == "x"]
     assert (number.low, number.high, number.blocks) == (low, high, False)
 
 
+_DOWN, _UP = "changes `x` downwards without a bound", "changes `x` upwards without a bound"
+
+
 @pytest.mark.parametrize(
     ("actions", "words"),
     [
-        ("(:action a :effect (increase (x) 1))", "`increase (x)` changes `x` upwards without a bound"),
-        ("(:action a :effect (decrease (x) 1))", "`decrease (x)` changes `x` downwards without a bound"),
+        (_doing("(and)", "(increase (x) 1)"), f"`increase (x)` {_UP}"),
+        (_doing("(and)", "(decrease (x) 1)"), f"`decrease (x)` {_DOWN}"),
         (
-            "(:action a :precondition (< (x) 9) :effect (increase (x) 1))"
-            "(:action b :effect (decrease (x) (step one)))",
-            "`decrease (x)` changes `x` downwards without a bound",
+            _doing("(< (x) 9)", "(increase (x) 1)") + _doing("(and)", "(decrease (x) (step ?s))", "b"),
+            f"`decrease (x)` {_DOWN}",
         ),
-        (
-            "(:action a :effect (assign (x) (/ 6 (- (x) 3))))",
-            "`assign (x)` changes `x` downwards without a bound",
-        ),
-        ("(:action a :effect (scale-up (x) 2))", "`scale-up (x)` changes `x` upwards without a bound"),
+        (_doing("(and)", "(assign (x) (/ 6 (- (x) 3)))"), f"`assign (x)` {_DOWN}"),
+        (_doing("(and)", "(scale-up (x) 2)"), f"`scale-up (x)` {_UP}"),
     ],
 )
 def test_what_grows_without_end_is_named(actions: str, words: str) -> None:
