@@ -17,17 +17,22 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, walk
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A condition or action to implement. ``three_valued`` conditions can be unknown."""
+    """A condition, a number or an action to implement. ``three_valued`` conditions can be unknown."""
 
     symbol: Symbol
     parameters: tuple[str, ...]
     three_valued: bool = False
 
+    @property
+    def counts(self) -> bool:
+        """Is it a number?"""
+        return self.symbol.kind == "function"
+
 
 @dataclass(frozen=True)
 class Interface:
-    """The leaves a tree uses, sorted by name; ``reads`` are the variables that conditions and guards ask the
-    robot for; the conditions of ``deduced`` ask the monitor alone."""
+    """The leaves a tree uses, sorted by name, numbers among the conditions; ``reads`` are the variables that
+    conditions and guards ask the robot for; the conditions of ``deduced`` ask the monitor alone."""
 
     conditions: tuple[Leaf, ...]
     actions: tuple[Leaf, ...]
@@ -46,7 +51,9 @@ class Interface:
 
 
 def variable_symbol(variable: Variable) -> Symbol:
-    """The condition leaf that reads a variable."""
+    """The condition leaf that reads a variable: a fact, or the number that it is a digit of."""
+    if variable.digit is not None:
+        return Symbol("function", variable.digit.function, len(variable.args))
     return Symbol("predicate", variable.predicate, len(variable.args))
 
 

@@ -43,7 +43,7 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
 )
 
 
-_ENGINES = ("btcpp", "btcpp_palette", "btcpp_project", "py_trees", "py_trees_robot")
+_ENGINES = ("btcpp", "btcpp_palette", "btcpp_project")
 """Formats that run; each says itself where it knows no numbers once it knows some."""
 
 

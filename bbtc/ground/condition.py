@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -139,7 +139,7 @@ def _spelt(digits: tuple[int, ...], low: int, high: int) -> Condition:
     )
 
 
-def number_in(digits: Sequence[int], state: Sequence[int]) -> int:
+def number_in(digits: Sequence[int], state: Sequence[int] | Mapping[int, int]) -> int:
     """What the digits of a number say in a state."""
     return sum((state[digit] >> 1) << place for place, digit in enumerate(digits))
 

@@ -123,9 +123,14 @@ class PyTreesReplay(Replay):
             return act
 
         methods: dict[str, object] = {"cancel": lambda name: self._world.cancel(name)}  # noqa: PLW0108 - the world of then
+
+        def number(name: str) -> Callable[..., int]:
+            return lambda *args: number_in_world(self._task, self._world, ground_name(name, args))
+
+        makers: dict[str, Callable[[str], object]]
+        makers = {"predicate": condition, "function": number, "action": action}
         for symbol, method in self._names.methods.items():
-            make = condition if symbol.kind == "predicate" else action
-            methods[method] = make(symbol.name)
+            methods[method] = makers[symbol.kind](symbol.name)
         self._namespace = types.SimpleNamespace(**methods)
         return self._namespace
 
@@ -133,6 +138,13 @@ class PyTreesReplay(Replay):
         if self._monitor is not None:
             self._namespace.monitor = monitor_in(self._module, world)
             world.watch(self._namespace.monitor, self._monitor.known, starts=False)
+
+
+def number_in_world(task: Task, world: World, name: str) -> int:
+    """The value that a number of a task has in a world."""
+    number = task.number_by_name[name]
+    digits = (world.read(task.variables[digit].name) for digit in number.digits)
+    return number.low + sum((value >> 1) << place for place, value in enumerate(digits))
 
 
 def _load(source: str) -> Any:

@@ -28,6 +28,7 @@ from bbtc.runtime.nodes import (
     skipper,
     until_success,
 )
+from bbtc.runtime.numbers import NumberBeliefs, NumberWorld, Shift, Values, between, on_numbers
 from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
 __all__ = [
@@ -40,9 +41,12 @@ __all__ = [
     "Latch",
     "Monitor",
     "Move",
+    "NumberBeliefs",
+    "NumberWorld",
     "Outcome",
     "Part",
     "Retry",
+    "Shift",
     "Skipper",
     "State",
     "StopOutside",
@@ -50,6 +54,7 @@ __all__ = [
     "Telling",
     "Try",
     "UntilSuccess",
+    "Values",
     "Walk",
     "When",
     "WithBeliefs",
@@ -57,11 +62,13 @@ __all__ = [
     "World",
     "all_of",
     "any_of",
+    "between",
     "draw",
     "fallback",
     "happen",
     "in_words",
     "negated",
+    "on_numbers",
     "retry",
     "run",
     "sequence",

@@ -24,7 +24,7 @@ RUNTIME = Option(
     ("embedded", "imported"),
 )
 
-MODULES = ("nodes", "world", "beliefs", "monitor")
+MODULES = ("nodes", "world", "beliefs", "monitor", "numbers")
 """The modules of :mod:`bbtc.runtime`."""
 
 

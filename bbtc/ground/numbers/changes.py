@@ -8,7 +8,16 @@ from fractions import Fraction
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
-from bbtc.ground.condition import FALSE, TRUE, Condition, conjunction, disjunction
+from bbtc.ground.condition import (
+    FALSE,
+    TRUE,
+    Condition,
+    Within,
+    conjunction,
+    conjuncts,
+    disjunction,
+    within,
+)
 from bbtc.ground.numbers.amounts import (
     FEWER,
     Amounts,
@@ -112,9 +121,21 @@ class Changes:
     ) -> list[Condition]:
         """The preconditions of actions that also keep numbers in their ranges."""
         return [
-            conjunction([condition, stays_within(each, self.blocking)])
+            _narrowed(conjunction([condition, stays_within(each, self.blocking)]))
             for condition, each in zip(conditions, factors, strict=True)
         ]
+
+
+def _narrowed(condition: Condition) -> Condition:
+    """The condition, with what it asks of each number as one test."""
+    parts = conjuncts(condition)
+    spans: dict[tuple[int, ...], tuple[int, int]] = {}
+    for part in parts:
+        if isinstance(part, Within):
+            low, high = spans.get(part.digits, (0, part.most))
+            spans[part.digits] = max(low, part.low), min(high, part.high)
+    others = [part for part in parts if not isinstance(part, Within)]
+    return conjunction([*others, *(within(digits, *span) for digits, span in spans.items())])
 
 
 def _most(factor: Factor, digits: tuple[int, ...]) -> int:
