@@ -101,8 +101,18 @@ def interface_of(tree: Tree) -> Interface:
     )
 
 
+BOUNDS = ("at_least", "at_most")
+"""What a node that reads a number is given besides its arguments: what it is to be compared with."""
+
+
 def parameters_of(task: Task, symbol: Symbol) -> tuple[str, ...]:
-    """The parameter names of a leaf: those that the domain declares, or else ``arg``, ``arg1``, …."""
+    """The parameter names of a leaf: those that the domain declares, or else ``arg``, ``arg1``, …. None of a
+    number is called as one of its :data:`BOUNDS`."""
+    names = _parameters_of(task, symbol)
+    return tuple(f"{name}_" if symbol.kind == "function" and name in BOUNDS else name for name in names)
+
+
+def _parameters_of(task: Task, symbol: Symbol) -> tuple[str, ...]:
     for signature in task.signatures:
         if (signature.kind, signature.symbol, len(signature.parameters)) == (
             symbol.kind,

@@ -43,10 +43,6 @@ BUILT_INS: Mapping[str, str] = MappingProxyType(
 )
 
 
-_ENGINES = ("btcpp", "btcpp_palette", "btcpp_project")
-"""Formats that run; each says itself where it knows no numbers once it knows some."""
-
-
 def format_names() -> tuple[str, ...]:
     """Every format that can be asked for: built-ins in their order, then plugins by name."""
     return tuple(dict.fromkeys([*BUILT_INS, *sorted(point.name for point in plugins())]))
@@ -88,12 +84,6 @@ def run_exporter(
 ) -> Artefact:
     """What an exporter makes. Raises :class:`BbtcError` where it refuses the tree, and where one of another
     package fails, or makes what cannot be written."""
-    if form in _ENGINES and tree.task.numbers:
-        raise BbtcError.single(
-            "BBT0441",
-            f"the format '{form}' does not know numbers, such as {tree.task.numbers[0].name}",
-            hint="`bbtc run` shows the tree at work; pictures, models and data know them",
-        )
     if form in BUILT_INS:
         return exporter.export(tree, options, figures)
     try:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
+from bbtc.backends.interface import BOUNDS
 from bbtc.backends.names import Symbol
 from bbtc.backends.pytrees.exporter import py_trees, py_trees_names
 from bbtc.ground.task import Task, ground_name
@@ -249,18 +250,24 @@ class BtcppReplay(Replay):
                     symbol = symbols[element.tag]
                     ports = names.interface.leaves[symbol].parameters
                     values = [element.attrib.pop(port) for port in ports]
+                    spans = [element.attrib.pop(port, "") for port in BOUNDS if symbol.kind == "function"]
                     assert all(key == "name" or key.startswith("_") for key in element.attrib)
-                    key = (element.tag, *values)
+                    key = (element.tag, *values, *spans)
                     if key not in known:
                         known[key] = f"Leaf{len(known)}"
-                        self._register_leaf(known[key], symbol, values, objects)
+                        self._register_leaf(known[key], symbol, values, objects, spans)
                     element.tag = known[key]
         for model in document.findall("TreeNodesModel"):
             for entry in [entry for entry in model if entry.tag in ("Action", "Condition")]:
                 model.remove(entry)
 
     def _register_leaf(
-        self, node_id: str, symbol: Symbol, values: list[str], objects: Mapping[str, str]
+        self,
+        node_id: str,
+        symbol: Symbol,
+        values: list[str],
+        objects: Mapping[str, str],
+        spans: list[str],
     ) -> None:
         status = self._engine.NodeStatus
         truth = {0: status.FAILURE, 1: status.RUNNING, 2: status.SUCCESS}
@@ -293,6 +300,17 @@ class BtcppReplay(Replay):
             self._factory.register_simple_condition(
                 node_id, safely(lambda node, world: truth[world.read(ground(node))])
             )
+            return
+
+        if symbol.kind == "function":
+            least, most = spans
+
+            def compare(node: Any, world: World) -> object:
+                value = number_in_world(self._task, world, ground(node))
+                inside = (not least or int(least) <= value) and (not most or value <= int(most))
+                return status.SUCCESS if inside else status.FAILURE
+
+            self._factory.register_simple_condition(node_id, safely(compare))
             return
 
         def start(node: Any, world: World) -> object:

@@ -40,7 +40,7 @@ def courier() -> bbtc.Tree:
     return bbtc.plan(SourceFile("courier.pddl", COURIER)).tree
 
 
-@pytest.mark.parametrize("form", ["py_trees"])
+@pytest.mark.parametrize("form", ["py_trees", "btcpp"])
 def test_exports_run_as_the_simulation_says(form: str, courier: bbtc.Tree) -> None:
     if engine_missing(form) is not None:
         pytest.skip(f"{engine_missing(form)} is not installed")

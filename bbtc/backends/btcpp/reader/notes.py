@@ -23,7 +23,7 @@ from bbtc.ground.condition import TRUE
 from bbtc.ground.task import Task
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, PlanStatus, Tree, walk
 
-_KINDS: Mapping[str, Kind] = {"predicate": "predicate", "action": "action"}
+_KINDS: Mapping[str, Kind] = {"predicate": "predicate", "function": "function", "action": "action"}
 _STATUSES: Mapping[str, PlanStatus] = {status: status for status in get_args(PlanStatus)}
 _NUMBERED_ID = re.compile(r"n([0-9]{1,9})")
 
