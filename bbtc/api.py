@@ -133,6 +133,7 @@ def plan(
     closed_world: bool = False,
     guarded: bool | None = None,
     allow_guess: bool = False,
+    deadline: Fraction | float | str | None = None,
     problem: str | None = None,
     lenient: bool = False,
     limits: Limits | None = None,
@@ -147,7 +148,8 @@ def plan(
     the target; of trees that meet it, ``prefer`` those of most ``success``, least ``cost`` or least ``size``;
     in a ``closed_world`` nobody else changes anything, and what the tree reads only for that is left out
     (``guarded=False`` means the same, and ``guarded=True`` the contrary); with ``allow_guess``, a tree may
-    succeed where the goal is believed, but not known; ``problem`` and ``lenient`` as in
+    succeed where the goal is believed, but not known; with a ``deadline`` in seconds, the target is one of
+    success by then (the plan's ``tree.success_by`` has bounds of it); ``problem`` and ``lenient`` as in
     :func:`load`; ``progress`` is told each refinement as it is made.
     The plan's ``tree.status`` says whether the target was reached; falling short of it raises nothing.
     Raises :class:`BbtcError` for input that is wrong and an unknown strategy, :class:`LimitReached` where the
@@ -164,7 +166,20 @@ def plan(
     options = Options(max_actions, retries, prefer, closed_world or guarded is False, allow_guess)
     tell = progress or (lambda _: None)
     task = _task(inputs, limits, report, Reading(problem, lenient, allow_guess))
-    return pipeline.plan_task(task, _exact(target), strategy or DEFAULT, limits, tell, options=options)
+    name = strategy or DEFAULT
+    if deadline is None:
+        return pipeline.plan_task(task, _exact(target), name, limits, tell, options=options)
+    from bbtc.artefacts.numbers import parse_written
+    from bbtc.planner.deadline.plan import plan_by
+
+    seconds, wanted = parse_written(str(deadline)), _exact(target)
+    if seconds <= 0:
+        raise ValueError("a deadline is above 0 seconds")
+    if max_actions is not None:
+        raise ValueError("with a deadline, the number of actions cannot be bounded")
+    planner = pipeline.plan_task
+    found = plan_by(task, seconds, planner, wanted, limits, strategy=name, progress=tell, options=options)
+    return found.plan
 
 
 def bounds(

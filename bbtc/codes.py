@@ -105,6 +105,8 @@ _CODES = (
     Code("BBT0228", "name with a meaning of its own"),
     Code("BBT0229", "derived predicate is external"),
     Code("BBT0230", "name that only a lenient reading takes", _WARNING),
+    Code("BBT0231", "event whose order or rate makes no sense"),
+    Code("BBT0232", "effect of an abort that nothing causes"),
     # 03xx: checks
     Code("BBT0301", "unused predicate", _WARNING),
     Code("BBT0302", "unreachable action", _WARNING),
@@ -120,6 +122,7 @@ _CODES = (
     Code("BBT0313", "condition that only others can make true", _NOTE),
     Code("BBT0315", "fact that nothing makes unknown", _WARNING, root_cause=True),
     Code("BBT0316", "goal that nothing can make true", _WARNING, root_cause=True),
+    Code("BBT0317", "condition that only events change", _NOTE),
     # 04xx: grounding
     Code("BBT0403", "too many initial states"),
     Code("BBT0404", "oneof in the initial state"),
@@ -148,6 +151,14 @@ _CODES = (
     Code("BBT0440", "use of numbers that cannot be told apart"),
     Code("BBT0441", "numbers where they are not supported"),
     Code("BBT0442", "comparison that can never hold", _WARNING),
+    Code("BBT0443", "duration that cannot be"),
+    Code("BBT0444", "time-out that cannot be"),
+    Code("BBT0445", "time-out beside hidden facts"),
+    Code("BBT0446", "time that is not known"),
+    Code("BBT0447", "deadline that no run can meet"),
+    Code("BBT0448", "body that tries again for ever"),
+    Code("BBT0451", "events that contradict each other"),
+    Code("BBT0452", "event that cannot be grounded yet"),
     # 05xx: planning
     Code("BBT0501", "unknown strategy", exit=ExitStatus.USAGE),
     Code("BBT0502", "nothing left to insert before the target", _WARNING),

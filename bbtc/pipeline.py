@@ -432,16 +432,13 @@ def plan_task(
     bug and raises ``AssertionError``. Raises :class:`bbtc.diagnostics.LimitReached` where the
     limits do not allow any tree at all.
     """
-    from bbtc.belief.chain import explore
     from bbtc.belief.rerolled import rerolled
-    from bbtc.belief.soundness import violations
     from bbtc.planner.best_tree import BestTree
     from bbtc.planner.bounds import judged, unjudged
+    from bbtc.planner.finish import checked
     from bbtc.planner.guard import guarded
     from bbtc.planner.options import DEFAULTS
     from bbtc.planner.strategies import run_strategy
-    from bbtc.planner.subgoals import with_subgoals
-    from bbtc.tree.validate import check_tree
 
     wanted = task.goal_probability if target is None else target
     options = options or DEFAULTS
@@ -473,13 +470,8 @@ def plan_task(
         plan = guarded(plan)
     if stopping is not None:
         plan = stopping.tree_of(plan, Limits(states=limits.states))
+    plan, chain = checked(plan, limits)
     task = plan.tree.task
-    plan = replace(plan, tree=replace(plan.tree, root=with_subgoals(task, plan.tree.root)))
-    check_tree(plan.tree)
-    chain = plan.chain or explore(task, plan.tree.root, Limits(states=limits.states))
-    broken = violations(task, chain)
-    if broken:
-        raise AssertionError(f"unsound tree: {'; '.join(broken)}")
     few = Limits(states=min(limits.states, _STATES_OF_WORLDS // 4))
     found = with_worst_world(plan.tree, plan.figures, few)
     return replace(plan, figures=found, rerolled=rerolled(task, chain), chain=None)

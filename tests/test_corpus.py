@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from tests import corpus as report
+from tests.long_form import amount
 
-EVERY = 12
+EVERY = amount(24, 12)
 
 
 def test_a_sample_of_every_family_loads(corpus: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from typing_extensions import assert_never
 
@@ -14,16 +14,18 @@ from bbtc.model import domain as md
 from bbtc.model import formula as mf
 from bbtc.syntax import ast
 
+_MOST_ATTEMPTS = 1000
+
 
 def template(names: Names, node: ast.Template) -> md.Template:
     """A template; parts with errors, which are reported, count as true conditions."""
     signature = names.templates[node.name.key]
     scope = {parameter.name: parameter for parameter in signature.parameters}
-    if isinstance(node.body, ast.BodyForeach):
+    for lonely in _lonely(node.body):
         names.report.error(
             "BBT0224",
             "`foreach` becomes children of the node around it, and there is none",
-            node.body.span,
+            lonely.span,
             "put it into a `sequence`, a `fallback` or a `skipper`",
         )
     return md.Template(
@@ -36,10 +38,26 @@ def template(names: Names, node: ast.Template) -> md.Template:
     )
 
 
+def _lonely(body: ast.Body, alone: bool = True) -> Iterator[ast.BodyForeach]:
+    """Every `foreach` with no control node around it that may have several children."""
+    match body:
+        case ast.BodyForeach() if alone:
+            yield body
+        case ast.BodyForeach(_, child) | ast.BodyRetry(_, child):
+            yield from _lonely(child, alone or isinstance(body, ast.BodyRetry))
+        case ast.BodyControl(_, children):
+            for child in children:
+                yield from _lonely(child, False)
+        case _:
+            pass
+
+
 def _body(names: Names, node: ast.Body, scope: Scope) -> md.Body:
     match node:
         case ast.BodyControl(kind, children, span):
             return md.BodyControl(kind, tuple(_body(names, child, scope) for child in children), span)
+        case ast.BodyRetry(number, child, span):
+            return md.BodyRetry(_attempts(names, number), _body(names, child, scope), span)
         case ast.BodyCondition(condition, span):
             return md.BodyCondition(formula(names, condition, scope), span)
         case ast.BodyCall():
@@ -49,6 +67,16 @@ def _body(names: Names, node: ast.Body, scope: Scope) -> md.Body:
             return md.BodyForeach(parameters, _body(names, child, inside), span)
         case _:
             assert_never(node)
+
+
+def _attempts(names: Names, number: ast.Number) -> int:
+    """How often a `retry` tries."""
+    if number.value.denominator > 1 or not 1 <= number.value <= _MOST_ATTEMPTS:
+        message = f"`retry` tries {number.text} times"
+        hint = f"a whole number from 1 to {_MOST_ATTEMPTS} says how often"
+        names.report.error("BBT0613", message, number.span, hint)
+        return 1
+    return int(number.value)
 
 
 def _call(names: Names, node: ast.BodyCall, scope: Scope) -> md.Body:

@@ -90,7 +90,7 @@ def _unread(known: Known) -> Iterator[tuple[md.Predicate, bool]]:
     for schema in model.schemas.values():
         read |= facts.observed(schema)
     read |= {atom.predicate for asked in model.thresholds.values() for atom in mf.atoms(asked.condition)}
-    written = {leaf.predicate for schema in model.schemas.values() for leaf in me.settings(schema.effect)}
+    written = {leaf.predicate for schema in model.schemas.values() for leaf in me.settings(schema.effects)}
     written |= {rule.predicate for rule in model.rules}
     for name, predicate in model.predicates.items():
         if name not in read and name not in model.symbols and not md.is_number(name):
@@ -143,7 +143,7 @@ def _set_to(model: md.Model, *, unknown: bool) -> set[str]:
     return {
         leaf.predicate
         for schema in model.schemas.values()
-        for leaf in me.settings(schema.effect)
+        for leaf in me.settings(schema.effects)
         if (leaf.value is Truth.UNKNOWN) is unknown
     }
 
@@ -161,7 +161,7 @@ def _untold(known: Known, lost: Collection[str]) -> Iterator[mf.Reading]:
         # What a draw, a condition of the start or an effect joins may be told by each other.
         told |= {leaf.predicate for choice in model.init.choices for leaf in me.settings(choice)}
         told |= {atom.predicate for clause in model.init.clauses for atom in mf.atoms(clause.condition)}
-        guards = (guard for schema in model.schemas.values() for guard in me.conditions(schema.effect))
+        guards = (guard for schema in model.schemas.values() for guard in me.conditions(schema.effects))
         told |= {atom.predicate for guard in guards for atom in mf.atoms(guard)}
     for reading in known.readings:
         predicate = model.predicates[reading.atom.predicate]
@@ -234,6 +234,21 @@ def _only_others(known: Known) -> Iterator[Diagnostic]:
             yield _about_reading("BBT0313", message, reading, hint, known)
 
 
+def _only_events(known: Known) -> Iterator[Diagnostic]:
+    model = known.model
+    actions = (schema for schema in model.schemas.values() if schema.exogenous is None)
+    told = {leaf.predicate for schema in actions for leaf in me.settings(schema.effects)}
+    by_itself = {leaf.predicate for event in model.events for leaf in me.settings(event.effects)}
+    events = {id(each) for event in model.events for each in facts.schema_conditions(event)}
+    for condition in known.conditions:
+        for reading in mf.readings(condition) if id(condition) not in events else ():
+            name = reading.atom.predicate
+            if name in by_itself and name not in told:
+                told.add(name)
+                message, hint = f"only events change `{name}`", "the robot can wait for it, and nothing else"
+                yield _about_reading("BBT0317", message, reading, hint, known)
+
+
 # --- actions ---------------------------------------------------------------------------------
 
 
@@ -247,7 +262,8 @@ def _unreachable_actions(known: Known) -> Iterator[Diagnostic]:
             ):
                 continue  # of which BBT0313 tells
             related = () if first is None else (Related("this is never true", first.span),)
-            yield Diagnostic("BBT0302", f"action `{name}` can never apply", schema.span, related=related)
+            message = f"{schema.kind} `{name}` can never {'apply' if schema.exogenous is None else 'happen'}"
+            yield Diagnostic("BBT0302", message, schema.span, related=related)
 
 
 def _impossible(formula: mf.Formula, reached: facts.Reached) -> mf.Formula | None:
@@ -262,6 +278,7 @@ def _impossible(formula: mf.Formula, reached: facts.Reached) -> mf.Formula | Non
 def _contradictions(known: Known) -> Iterator[Diagnostic]:
     for schema in known.model.schemas.values():
         yield from _contradictions_in(schema.effect, {})
+        yield from _contradictions_in(schema.on_abort, {})
 
 
 def _contradictions_in(
@@ -299,20 +316,23 @@ def _duplicates(known: Known) -> Iterator[Diagnostic]:
     seen: dict[tuple[object, ...], md.Schema] = {}
     for schema in known.model.schemas.values():
         renamed = {parameter.name: f"?{number}" for number, parameter in enumerate(schema.parameters)}
-        key = (tuple(parameter.types for parameter in schema.parameters), *_renamed(schema, renamed))
+        kinds = tuple(parameter.types for parameter in schema.parameters)
+        key = (schema.exogenous, kinds, *_renamed(schema, renamed))
         before = seen.setdefault(key, schema)
         if before is not schema:
             yield Diagnostic(
                 "BBT0305",
-                f"action `{schema.name}` does the same as `{before.name}`",
+                f"{schema.kind} `{schema.name}` does the same as `{before.name}`",
                 schema.span,
                 related=(Related(f"`{before.name}`", before.span),),
             )
 
 
 def _without_effect(known: Known) -> Iterator[Diagnostic]:
+    if known.model.events:
+        return  # it waits for what happens by itself
     for name, schema in known.model.schemas.items():
-        if not schema.tells and next(me.settings(schema.effect), None) is None:
+        if not schema.tells and next(me.settings(schema.effects), None) is None:
             yield Diagnostic("BBT0306", f"action `{name}` changes nothing", schema.span)
 
 
@@ -322,11 +342,12 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
     actions = known.relevant
     possible = known.reached.actions
     for name, schema in known.model.schemas.items():
-        changes = next(me.settings(schema.effect), None) is not None
-        if name not in actions and name in possible and changes:
+        changes = next(me.settings(schema.effects), None) is not None
+        waits = schema.exogenous is None and known.model.events  # for what happens by itself
+        if name not in actions and name in possible and changes and not waits:
             yield Diagnostic(
                 "BBT0307",
-                f"action `{name}` cannot matter to the goal",
+                f"{schema.kind} `{name}` cannot matter to the goal",
                 schema.span,
                 "no condition on the way to the goal reads what it changes",
             )
@@ -336,7 +357,7 @@ def _impossible_comparisons(known: Known) -> Iterator[Diagnostic]:
     """Comparisons that no values within the ranges make true. Of numbers without a declared range nothing is
     known here, and functions that never change have the values of `:init`."""
     model = known.model
-    changed = {change.function for each in model.schemas.values() for change in me.changes(each.effect)}
+    changed = {change.function for each in model.schemas.values() for change in me.changes(each.effects)}
 
     def of(amount: Amount) -> Interval:
         return interval(amount, value)
@@ -362,8 +383,8 @@ def _impossible_comparisons(known: Known) -> Iterator[Diagnostic]:
 
 def _probabilities(known: Known) -> Iterator[Diagnostic]:
     for schema in known.model.schemas.values():
-        for part in me.walk(schema.effect):
-            if isinstance(part, me.Choice):
+        for part in me.walk(schema.effects):
+            if isinstance(part, me.Choice) and part.timeout is None:
                 yield from _doubtful(part)
 
 
@@ -399,20 +420,28 @@ def _unused_parameters(known: Known) -> Iterator[Diagnostic]:
             if not _occurs(schema, parameter, other):
                 yield Diagnostic(
                     "BBT0309",
-                    f"action `{schema.name}` never uses its parameter `{parameter.name}`",
+                    f"{schema.kind} `{schema.name}` never uses its parameter `{parameter.name}`",
                     parameter.span,
-                    "every object it may take makes another ground action",
+                    f"every object it may take makes another ground {schema.kind}",
                 )
 
 
 def _occurs(schema: md.Schema, parameter: Parameter, other: Parameter) -> bool:
     """Whether renaming the parameter changes the action."""
     renamed = _renamed(schema, {parameter.name: other.name})
-    return renamed != (schema.precondition, schema.effect, schema.observe, schema.told)
+    whole = (
+        schema.precondition,
+        schema.effect,
+        schema.observe,
+        schema.told,
+        schema.on_abort,
+        schema.duration,
+    )
+    return renamed != whole
 
 
-def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, object, object, object]:
-    """Precondition, effect and observations with other parameters."""
+def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object, ...]:
+    """Precondition (``:while`` among it), effects, observations and duration with other parameters."""
     free, observed = dict(binding), schema.observe
     told: object = None
     if isinstance(observed, me.Choice):
@@ -423,7 +452,9 @@ def _renamed(schema: md.Schema, binding: Mapping[str, mf.Term]) -> tuple[object,
         replace(each, condition=mf.substitute(each.condition, free), when=mf.substitute(each.when, free))
         for each in schema.told
     )
-    return mf.substitute(schema.precondition, free), me.substitute(schema.effect, free), told, besides
+    effect, abort = me.substitute(schema.effect, free), me.substitute(schema.on_abort, free)
+    duration = me.substitute_duration(schema.duration, free)
+    return mf.substitute(schema.precondition, free), effect, told, besides, abort, duration
 
 
 def _unused_templates(known: Known) -> Iterator[Diagnostic]:
@@ -449,6 +480,7 @@ CHECKS = (
     Check("BBT0304", _lost_knowledge),
     Check("BBT0304", _hopeless_conditions, needs_problem=True),
     Check("BBT0313", _only_others, needs_problem=True),
+    Check("BBT0317", _only_events),
     Check("BBT0305", _duplicates),
     Check("BBT0306", _without_effect),
     Check("BBT0307", _irrelevant_actions, needs_problem=True),

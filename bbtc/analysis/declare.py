@@ -40,6 +40,7 @@ def declare(names: Names, domain: ast.Definition, problem: ast.Definition | None
     _functions(names, domain)
     _fluents(names, problem)
     _actions(names, list(sections(domain, ast.Action)))
+    _events(names, domain)
     for template in sections(domain, ast.Template):
         names.section = f"template {template.name.key}"
         signature = _signature(names, template)
@@ -347,5 +348,17 @@ def _actions(names: Names, nodes: list[ast.Action]) -> None:
         names.actions[signature.name] = signature
 
 
-def _signature(names: Names, node: ast.Action | ast.Template) -> Signature:
+def _events(names: Names, domain: ast.Definition) -> None:
+    """Every event; their names are those of no action, since reports and exports name both."""
+    for node in sections(domain, ast.Exogenous):
+        names.section = f"event {node.name.key}"
+        signature = _signature(names, node)
+        before = names.events.setdefault(signature.name, signature)
+        if before is not signature:
+            twice(names.report, "event", node.name, before)
+        elif signature.name in names.actions:
+            twice(names.report, "event", node.name, names.actions[signature.name], other="an action")
+
+
+def _signature(names: Names, node: ast.Action | ast.Exogenous | ast.Template) -> Signature:
     return Signature(node.name.key, names.parameters(node.parameters), node.name.span)

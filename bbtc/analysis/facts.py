@@ -27,7 +27,7 @@ def plain(formula: mf.Formula) -> Iterator[str]:
 def schema_conditions(schema: md.Schema) -> Iterator[mf.Formula]:
     """The precondition, guards and observed condition of an action."""
     yield schema.precondition
-    yield from me.conditions(schema.effect)
+    yield from me.conditions(schema.effects)
     if isinstance(schema.observe, me.Choice):
         yield from me.conditions(schema.observe)
     elif schema.observe is not None:
@@ -198,7 +198,7 @@ def _conclude(rule: md.Rule, result: Reached) -> None:
 def _happen(schema: md.Schema, result: Reached) -> None:
     if schema.name in result.actions or result.possible(schema.precondition):
         result.actions[schema.name] = None
-        _apply(schema.effect, result)
+        _apply(schema.effects, result)
         _tell(observed(schema), result)
 
 
@@ -238,7 +238,7 @@ def _apply(effect: me.Effect, result: Reached) -> None:
 def relevant(model: md.Model) -> set[str]:
     """The actions that can matter to the goal, a reward metric or a template, as predicates tell: checks
     look at models that may be too large to ground. Grounding knows atoms, and finds more
-    (:mod:`bbtc.ground.relevance`, :mod:`bbtc.ground.prune`)."""
+    (:mod:`bbtc.ground.pruning.relevance`, :mod:`bbtc.ground.pruning.prune`)."""
     setters, rules = _setters(model)
 
     def leads(node: tuple[bool, str]) -> Iterator[tuple[bool, str]]:
@@ -248,7 +248,7 @@ def relevant(model: md.Model) -> set[str]:
                 return iter(())
             kept = (
                 (False, md.number_predicate(change.function))
-                for change in me.changes(model.schemas[name].effect)
+                for change in me.changes(model.schemas[name].effects)
                 if (range_ := model.functions[change.function].range) is not None and range_.blocks
             )
             return chain(read(schema_conditions(model.schemas[name])), kept)
@@ -269,7 +269,7 @@ def relevant(model: md.Model) -> set[str]:
     for sensor in model.sensors:
         start += read([sensor.condition, md.facts_told(sensor.sensed)])
     for name, schema in model.schemas.items():
-        if schema.tells or (model.metric == "reward" and me.earns(schema.effect)):
+        if schema.tells or (model.metric == "reward" and me.earns(schema.effects)):
             start.append((True, name))
     return {name for is_action, name in reachable(start, leads) if is_action}
 
@@ -278,7 +278,7 @@ def _setters(model: md.Model) -> tuple[dict[str, list[str]], dict[str, list[md.R
     """By predicate: the actions that set it, and the rules that derive it."""
     setters: dict[str, list[str]] = {}
     for name, schema in model.schemas.items():
-        for predicate in {leaf.predicate for leaf in me.settings(schema.effect)}:
+        for predicate in {leaf.predicate for leaf in me.settings(schema.effects)}:
             setters.setdefault(predicate, []).append(name)
     rules: dict[str, list[md.Rule]] = {}
     for rule in model.rules:

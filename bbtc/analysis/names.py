@@ -68,6 +68,7 @@ class Names:
     predicates: dict[str, Predicate] = field(default_factory=dict)
     functions: dict[str, Function] = field(default_factory=dict)
     actions: dict[str, Signature] = field(default_factory=dict)
+    events: dict[str, Signature] = field(default_factory=dict)
     templates: dict[str, Signature] = field(default_factory=dict)
     costs: frozenset[str] = frozenset({"total-cost"})
     rewards: frozenset[str] = frozenset({"reward"})

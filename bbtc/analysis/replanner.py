@@ -174,9 +174,9 @@ def one_value(
             return me.When(condition, one_value(found, inner, denied), span)
         case me.ForEach(parameters, inner, span):
             return me.ForEach(parameters, one_value(found, inner, denied), span)
-        case me.Choice(branches, oneof, span):
+        case me.Choice(branches):
             made = (replace(each, effect=one_value(found, each.effect, denied)) for each in branches)
-            return me.Choice(tuple(made), oneof, span)
+            return replace(effect, branches=tuple(made))
         case me.Set() | me.Add() | me.Change():
             return effect
         case _:

@@ -129,7 +129,7 @@ def _in_domain(model: md.Model) -> Iterator[_Use]:
     for formula in facts.all_conditions(replace(model, goal=None, init=md.Init())):
         yield from _in_formula(formula)
     for schema in model.schemas.values():
-        yield from _in_effect(schema.effect)
+        yield from _in_effect(schema.effects)
         if schema.observe is not None:
             yield ":contingent", schema.observe_span
         if isinstance(schema.observe, me.Choice):
@@ -204,6 +204,8 @@ def _in_effect(effect: me.Effect) -> Iterator[_Use]:
                 yield from _in_formula(condition)
             case me.ForEach(_, _, span):
                 yield ":universal-effects", span
+            case me.Choice(timeout=me.TimeOut()):
+                pass
             case me.Choice(_, oneof, span):
                 yield ":non-deterministic" if oneof else ":probabilistic-effects", span
             case _:

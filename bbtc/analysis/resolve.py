@@ -8,10 +8,11 @@ from fractions import Fraction
 
 from typing_extensions import assert_never
 
-from bbtc.analysis import bodies, facts, formulas, po_pddl, replanner, truth_words
+from bbtc.analysis import bodies, exogenous, facts, formulas, po_pddl, replanner, truth_words
 from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections, weighted
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
+from bbtc.analysis.timing import timed
 from bbtc.diagnostics import Related, Report
 from bbtc.kleene import Truth
 from bbtc.markov import reachable
@@ -33,12 +34,12 @@ _PROBLEM_ONLY = (
 )
 _LISTS = (ast.Requirements, ast.TypedSection, ast.Predicates, ast.Functions)
 _SEVERAL = (
-    *(ast.Action, ast.Derived, ast.Sensor, ast.Template, ast.Hidden),
+    *(ast.Action, ast.Exogenous, ast.Derived, ast.Sensor, ast.Template, ast.Hidden),
     *(ast.StateVariable, ast.AtomList, ast.ObservationModel),
 )
 """What a definition has several of; of everything else one section is enough."""
 _DOMAIN_ONLY = (
-    *(ast.Predicates, ast.Functions, ast.Action, ast.Derived, ast.Sensor, ast.Template),
+    *(ast.Predicates, ast.Functions, ast.Action, ast.Exogenous, ast.Derived, ast.Sensor, ast.Template),
     *(ast.StateVariable, ast.AtomList, ast.DefaultSensing, ast.Observables, ast.ObservationModel),
 )
 
@@ -72,6 +73,8 @@ def resolve(
         if sensing is not None and action.observe is None:
             made = replace(made, observe=replanner.told(shared, sensing.span), observe_span=sensing.span)
         schemas[signature.name] = replace(made, told=(*made.told, *told))
+    for event in exogenous.events(names, domain):
+        schemas[event.name] = replace(event, effect=replanner.one_value(variables, event.effect))
     rules = tuple(rule for node in sections(domain, ast.Derived) for rule in _rules(names, node))
     if sensing is not None:
         rules = (*rules, *replanner.derived(names, shared, sensing.span))
@@ -193,17 +196,27 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
             assert_never(node.observe)
     if node.repeats:
         _check_repeats(names, f"action `{signature.name}`", observe, node.name.span)
-    return md.Schema(
+    precondition = (
+        mf.ALWAYS if node.precondition is None else formulas.formula(names, node.precondition, scope)
+    )
+    during = None if node.during is None else formulas.formula(names, node.during, scope)
+    if node.on_abort is not None and during is None:
+        message = f"`:on-abort` of action `{signature.name}` says nothing: there is no `:while`"
+        names.report.error("BBT0232", message, node.on_abort.span, "nothing ends the action before its end")
+    schema = md.Schema(
         signature.name,
         signature.parameters,
-        mf.ALWAYS if node.precondition is None else formulas.formula(names, node.precondition, scope),
+        precondition if during is None else mf.And((precondition, during)),
         me.NOTHING if node.effect is None else formulas.effect(names, node.effect, scope),
         observe,
         None if node.observe is None else node.observe.span,
         node.repeats,
         told,
-        node.span,
+        during,
+        me.NOTHING if node.on_abort is None else formulas.effect(names, node.on_abort, scope),
+        span=node.span,
     )
+    return timed(names, schema, node.timing, scope)
 
 
 def _observables(domain: ast.Definition) -> frozenset[str]:
@@ -304,14 +317,14 @@ def _sensor(names: Names, node: ast.Sensor) -> md.Sensor:
 def _counts_cost(names: Names, schemas: dict[str, md.Schema]) -> bool:
     if not (names.costs & names.counted).isdisjoint(names.functions):
         return True
-    added = (leaf for schema in schemas.values() for leaf in me.leaves(schema.effect))
+    added = (leaf for schema in schemas.values() for leaf in me.leaves(schema.effects))
     return any(isinstance(leaf, me.Add) and leaf.to == "cost" for leaf in added)
 
 
 def _three_valued(model: md.Model) -> dict[str, md.Predicate]:
     """Mark the predicates that something makes unknown, derived ones through what they read."""
     unknown: dict[str, None] = {}
-    effects = [schema.effect for schema in model.schemas.values()] + list(model.init.choices)
+    effects = [schema.effects for schema in model.schemas.values()] + list(model.init.choices)
     for effect in effects:
         for leaf in me.leaves(effect):
             if isinstance(leaf, me.Set) and leaf.value is Truth.UNKNOWN:

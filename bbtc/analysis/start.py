@@ -73,7 +73,7 @@ def _is_only_observed(model: md.Model, predicate: str) -> bool:
         schema
         for schema in model.schemas.values()
         if any(
-            leaf.predicate == predicate and leaf.value is Truth.TRUE for leaf in me.settings(schema.effect)
+            leaf.predicate == predicate and leaf.value is Truth.TRUE for leaf in me.settings(schema.effects)
         )
     ]
     conditions = [formula for schema in model.schemas.values() for formula in facts.schema_conditions(schema)]
@@ -91,7 +91,7 @@ def _is_only_observed(model: md.Model, predicate: str) -> bool:
 
 def _observes(schema: md.Schema, predicate: str) -> bool:
     parts = schema.precondition.parts if isinstance(schema.precondition, mf.And) else (schema.precondition,)
-    guards = list(me.conditions(schema.effect))
+    guards = list(me.conditions(schema.effects))
     return any(
         isinstance(part, mf.Test) and part.kind == "unknown" and part.atom.predicate == predicate
         for part in (*parts, *guards)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -261,3 +262,15 @@ def nearest(name: str, known: Sequence[str]) -> str | None:
 
     near = get_close_matches(name[:_LONGEST_SHOWN], known, n=1)
     return f"did you mean '{near[0]}'?" if near else None
+
+
+def optional(members: Mapping[str, At], name: str) -> list[At]:
+    """The elements of a list that may be missing."""
+    return members[name].elements() if name in members else []
+
+
+def check_distinct(at: At, names: Sequence[str]) -> None:
+    """Raise a fault if two neighbours of a sorted list of names are equal."""
+    for name, following in itertools.pairwise(names):
+        if name == following:
+            raise at.fault("BBT0607", f"'{clip(name)}' stands twice")

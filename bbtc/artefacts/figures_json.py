@@ -10,7 +10,7 @@ from bbtc.artefacts.conditions import condition_to_json
 from bbtc.artefacts.numbers import figure_text
 from bbtc.belief.draws import Values
 from bbtc.belief.tick import NodeStatus
-from bbtc.ground.task import differences, values_in_words
+from bbtc.ground.describe import differences, values_in_words
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree
 

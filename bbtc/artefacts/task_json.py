@@ -6,30 +6,36 @@ tool must read stays small.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.artefacts.conditions import condition_from_json, condition_to_json, number_of, variable_from_json
-from bbtc.artefacts.cursor import At, Faults, clip, run_reader
-from bbtc.artefacts.hidden_json import component_to_json, observation_to_json, true_world, true_world_to_json
+from bbtc.artefacts import numbers_json
+from bbtc.artefacts.conditions import condition_to_json, number_of
+from bbtc.artefacts.cursor import At, Faults, check_distinct, clip, optional, run_reader
+from bbtc.artefacts.duration_json import (
+    duration_from_json,
+    duration_to_json,
+    may_time_out,
+    timeout_from_json,
+)
+from bbtc.artefacts.hidden_json import (
+    HiddenReader,
+    component_to_json,
+    observation_to_json,
+    true_world,
+    true_world_to_json,
+)
 from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
-from bbtc.artefacts.numbers_json import (
-    changes_from_json,
-    changes_to_json,
-    digits_from_json,
-    digits_of_value,
-    number_to_json,
-    without_digits,
-)
-from bbtc.artefacts.prior_json import check_sum, prior_from_json
+from bbtc.artefacts.prior_json import check_sum
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
+from bbtc.ground.describe import values_in_words
+from bbtc.ground.events import clashes
 from bbtc.ground.numbers.occurrences import with_digit_effects
 from bbtc.ground.task import (
     Body,
@@ -39,25 +45,21 @@ from bbtc.ground.task import (
     BodyTemplate,
     Change,
     Charge,
-    Component,
     Effect,
     Factor,
     GroundAction,
+    GroundEvent,
     GroundTemplate,
     InitialState,
-    Knowledge,
-    NumberVariable,
-    Observation,
     Outcome,
     Signature,
     Task,
     Variable,
     ground_name,
-    numbers_of,
     split_name,
-    values_in_words,
 )
 from bbtc.kleene import Truth
+from bbtc.limits import Limits
 from bbtc.source import SourceFile
 from bbtc.tree.validate import MAX_DEPTH, active_templates, body_problems
 
@@ -87,7 +89,7 @@ def task_to_json(task: Task) -> Json:
         value["metric"] = task.metric
     value["variables"] = [_variable_to_json(each) for each in task.variables if each.digit is None]
     if task.numbers:
-        value["numbers"] = [number_to_json(number) for number in task.numbers]
+        value["numbers"] = [numbers_json.number_to_json(number) for number in task.numbers]
     value["initial"] = [
         {
             "p": given_text(state.probability),
@@ -103,6 +105,8 @@ def task_to_json(task: Task) -> Json:
     if task.origin is not None:
         value["origin"] = task_to_json(task.origin)
     value["actions"] = [_action_to_json(action, task) for action in task.actions]
+    if task.events:
+        value["events"] = [_event_to_json(event, task.variables) for event in task.events]
     if task.templates:
         value["templates"] = [_template_to_json(template, task.variables) for template in task.templates]
     if task.signatures:
@@ -116,7 +120,8 @@ def _variable_to_json(variable: Variable) -> Json:
     value: Json = {"name": variable.name}
     if split_name(variable.name) != (variable.predicate, variable.args):
         value |= {"predicate": variable.predicate, "args": list(variable.args)}
-    return value | {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    value |= {"values": [truth.word for truth in variable.values], "hidden": variable.hidden}
+    return value | ({"external": True} if variable.external else {})
 
 
 def _change_to_json(change: Change, task: Task) -> Json:
@@ -141,7 +146,26 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
     }
     if action.changes:
         value["changes"] = [_change_to_json(change, task) for change in action.changes]
+    if action.duration is not None:
+        value["duration"] = duration_to_json(action.duration)
+    if action.timeout is not None:
+        value["timeout"] = given_text(action.timeout)
+    if action.during is not None:
+        value["while"] = condition_to_json(action.during, task.variables)
+    if action.on_abort:
+        value["on_abort"] = _chance_to_json(action.on_abort, task.variables)
     return value
+
+
+def _event_to_json(event: GroundEvent, variables: Sequence[Variable]) -> Json:
+    value: Json = {
+        "name": event.name,
+        "schema": event.schema,
+        "args": list(event.args),
+        "precondition": condition_to_json(event.precondition, variables),
+        **_chance_to_json(event.factors, variables),
+    }
+    return value | ({"round": event.round} if event.round else {})
 
 
 def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
@@ -170,11 +194,13 @@ def _outcome_to_json(outcome: Outcome, variables: Sequence[Variable]) -> Json:
         value["cost"] = given_text(outcome.cost)
     if outcome.charges:
         value["charges"] = [_charge_to_json(charge, variables) for charge in outcome.charges]
+    if outcome.timed_out:
+        value["timed_out"] = True
     if outcome.changes:
         # What they do to digits is worked out again when they are read.
-        shown = without_digits(outcome.effects, variables)
+        shown = numbers_json.without_digits(outcome.effects, variables)
         value["effects"] = [_effect_to_json(effect, variables) for effect in shown]
-        value["numbers"] = changes_to_json(outcome.changes, variables)
+        value["numbers"] = numbers_json.changes_to_json(outcome.changes, variables)
     return value
 
 
@@ -211,8 +237,10 @@ def _template_to_json(template: GroundTemplate, variables: Sequence[Variable]) -
 
 def _body_to_json(body: Body, variables: Sequence[Variable]) -> Json:
     match body:
-        case BodyControl(kind, children):
-            return {"type": kind, "children": [_body_to_json(child, variables) for child in children]}
+        case BodyControl(kind, children, attempts):
+            counted = {} if attempts is None else {"attempts": attempts}
+            inner = [_body_to_json(child, variables) for child in children]
+            return {"type": kind, **counted, "children": inner}
         case BodyCondition(condition):
             return {"type": "condition", "condition": condition_to_json(condition, variables)}
         case BodyAction(action):
@@ -270,16 +298,17 @@ def read_task(at: At, faults: Faults) -> Task:
             "components",
             "origin",
             "true_worlds",
+            "events",
         ],
     )
     variables = faults.each(members["variables"].elements(), _variable)
-    for digits in faults.each(_optional(members, "numbers"), digits_from_json):
+    for digits in faults.each(optional(members, "numbers"), numbers_json.digits_from_json):
         variables += digits
     faults.stop_if_any()  # every mention of a variable would be a fault of its own
     variables.sort(key=lambda variable: variable.name)
-    _check_distinct(members["variables"], [variable.name for variable in variables])
+    check_distinct(members["variables"], [variable.name for variable in variables])
     reader = _Reader.of(variables)
-    components = tuple(faults.each(_optional(members, "components"), reader.component))
+    components = tuple(faults.each(optional(members, "components"), reader.component))
     faults.stop_if_any()  # changes name them by number
     reader = replace(reader, components=components)
     actions = faults.each(members["actions"].elements(), reader.action)
@@ -293,7 +322,7 @@ def read_task(at: At, faults: Faults) -> Task:
         goal=faults.attempt(lambda: reader.condition(members["goal"]), no_goal),
         actions=tuple(sorted(actions, key=lambda action: action.name)),
         templates=tuple(
-            sorted(faults.each(_optional(members, "templates"), reader.template), key=lambda t: t.name)
+            sorted(faults.each(optional(members, "templates"), reader.template), key=lambda t: t.name)
         ),
         goal_probability=faults.attempt(
             lambda: (
@@ -306,31 +335,45 @@ def read_task(at: At, faults: Faults) -> Task:
         ),
         metric=faults.attempt(lambda: _metric(members), "cost"),
         signatures=tuple(
-            sorted(
-                faults.each(_optional(members, "signatures"), _signature), key=lambda s: (s.kind, s.symbol)
-            )
+            sorted(faults.each(optional(members, "signatures"), _signature), key=lambda s: (s.kind, s.symbol))
         ),
         components=components,
         origin=origin,
         true_worlds=(
-            tuple(faults.each(_optional(members, "true_worlds"), true_world))
+            tuple(faults.each(optional(members, "true_worlds"), true_world))
             if origin is None
             else origin.true_worlds
+        ),
+        events=tuple(
+            sorted(faults.each(optional(members, "events"), reader.event), key=lambda e: (e.round, e.name))
         ),
     )
     faults.stop_if_any()
     check_sum(members["initial"], [state.probability for state in task.initial])
-    _check_distinct(members["actions"], [action.name for action in task.actions])
+    check_distinct(members["actions"], [action.name for action in task.actions])
+    _check_events(members, task)
     _check_templates(members, task, faults)
     return task
 
 
+def _check_events(members: Mapping[str, At], task: Task) -> None:
+    """Raise a fault for events that contradict each other, or stand beside hidden facts."""
+    if not task.events:
+        return
+    names = [each.name for each in task.occurrences]
+    check_distinct(members["events"], sorted(names))
+    if task.components:
+        raise members["events"].fault("BBT0604", "events beside hidden facts are not supported")
+    for finding in clashes(task.events, task.variables, Limits()):
+        raise members["events"].fault("BBT0604", finding.message)
+
+
+_BODIES = (
+    *("sequence", "fallback", "skipper", "retry-until-success"),
+    *("condition", "action", "template"),
+)
 _TEMPLATE_FIELDS = ("name", "template", "args", "precondition", "body")
 _ZERO, _ONE = Fraction(0), Fraction(1)
-
-
-def _optional(members: Mapping[str, At], name: str) -> list[At]:
-    return members[name].elements() if name in members else []
 
 
 def _metric(members: Mapping[str, At]) -> Literal["cost", "reward"]:
@@ -339,15 +382,8 @@ def _metric(members: Mapping[str, At]) -> Literal["cost", "reward"]:
     )
 
 
-def _check_distinct(at: At, names: Sequence[str]) -> None:
-    """Raise a fault if two neighbours of a sorted list of names are equal."""
-    for name, following in itertools.pairwise(names):
-        if name == following:
-            raise at.fault("BBT0607", f"'{clip(name)}' stands twice")
-
-
 def _variable(at: At) -> Variable:
-    members = at.members(["name", "values"], ["hidden", "predicate", "args"])
+    members = at.members(["name", "values"], ["hidden", "predicate", "args", "external"])
     name = members["name"].string()
     if "predicate" in members or "args" in members:
         at.members(["predicate", "args"], list(members))  # both or neither
@@ -359,7 +395,8 @@ def _variable(at: At) -> Variable:
     if sorted(values) not in (["false", "true"], ["false", "true", "unknown"]):
         raise members["values"].fault("BBT0604", "the values are true, false and, for some, unknown")
     hidden = "hidden" in members and members["hidden"].flag()
-    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden)
+    external = "external" in members and members["external"].flag()
+    return Variable(predicate, args, three_valued="unknown" in values, hidden=hidden, external=external)
 
 
 def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
@@ -377,75 +414,8 @@ def _signature(at: At) -> Signature:
 
 
 @dataclass(frozen=True, slots=True)
-class _Reader:
+class _Reader(HiddenReader):
     """Reads what refers to the variables of a task."""
-
-    variables: tuple[Variable, ...]
-    index: Mapping[str, int]
-    numbers: Mapping[str, NumberVariable]
-    components: tuple[Component, ...] = ()
-
-    @classmethod
-    def of(cls, variables: Iterable[Variable]) -> _Reader:
-        """For some variables."""
-        listed = tuple(variables)
-        index = {variable.name: number for number, variable in enumerate(listed)}
-        return cls(listed, index, {number.name: number for number in numbers_of(listed)})
-
-    def component(self, at: At) -> Component:
-        members = at.members(["facts", "prior", "known"], ["seen", "first"])
-        facts, seen = members["facts"].strings(), self._seen(members)
-        _check_distinct(members["facts"], sorted(facts))
-        local = self._local(facts, seen)
-        prior, diagram = prior_from_json(members["prior"], {fact: at for at, fact in enumerate(facts)})
-        known = sorted(
-            (self._knowledge(each, local) for each in members["known"].elements()),
-            key=lambda each: each.variable,
-        )
-        first = tuple(local.observation(each) for each in _optional(members, "first"))
-        return Component(facts, prior, tuple(known), first, seen, diagram)
-
-    def _knowledge(self, at: At, local: _Reader) -> Knowledge:
-        members = at.members(["variable", "condition"], ["at_least"])
-        variable = variable_from_json(members["variable"], self.index)
-        if not self.variables[variable].three_valued:
-            name = clip(self.variables[variable].name)
-            raise members["variable"].fault("BBT0604", f"variable '{name}' cannot be unknown")
-        at_least = members["at_least"].given_probability() if "at_least" in members else _ONE
-        if 2 * at_least <= 1:
-            raise members["at_least"].fault("BBT0604", "must be above 1/2, for one side to be believed")
-        return Knowledge(variable, local.condition(members["condition"]), at_least)
-
-    def _seen(self, members: Mapping[str, At]) -> tuple[int, ...]:
-        return tuple(variable_from_json(each, self.index) for each in _optional(members, "seen"))
-
-    def _local(self, facts: Sequence[str], seen: Sequence[int]) -> _Reader:
-        """Reads what refers to the local variables of a component."""
-        hidden = (Variable(*split_name(fact), three_valued=False, hidden=True) for fact in facts)
-        return _Reader.of((*hidden, *(self.variables[variable] for variable in seen)))
-
-    def observation(self, at: At) -> Observation:
-        members = at.members(["condition"], ["when", "accuracy", "accuracy_false"])
-        return Observation(
-            self.condition(members["condition"]),
-            members["accuracy"].given_probability() if "accuracy" in members else _ONE,
-            self.condition(members["when"]) if "when" in members else None,
-            members["accuracy_false"].given_probability() if "accuracy_false" in members else None,
-        )
-
-    def change(self, at: At) -> Change:
-        members = at.members(["component"], ["seen", "outcomes", "factors", "oneof", "observations"])
-        number = members["component"].value
-        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(self.components):
-            message = f"must be the number of a component, below {len(self.components)}"
-            raise members["component"].fault("BBT0604", message)
-        seen = self._seen(members)
-        local = self._local(self.components[number].facts, seen)
-        observations = tuple(local.observation(each) for each in _optional(members, "observations"))
-        return Change(number, seen, local.chance(at, members), observations)
-
-    def condition(self, at: At) -> Condition:
-        return condition_from_json(at, self.index, self.numbers)
 
     def initial_state(self, at: At) -> InitialState:
         members = at.members(["p", "assign"])
@@ -460,7 +430,7 @@ class _Reader:
         values: dict[int, Truth] = {}
         for name, value in at.entries():
             if name in self.numbers:
-                values.update(digits_of_value(value, self.numbers[name]))
+                values.update(numbers_json.digits_of_value(value, self.numbers[name]))
                 continue
             variable = number_of(value, name, self.index)
             truth = Truth.from_word(value.word("true", "false", "unknown"))
@@ -471,18 +441,42 @@ class _Reader:
 
     def action(self, at: At) -> GroundAction:
         members = at.members(
-            ["name", "schema", "args", "cost", "precondition"], ["outcomes", "factors", "oneof", "changes"]
+            ["name", "schema", "args", "cost", "precondition"],
+            ["outcomes", "factors", "oneof", "changes", "while", "on_abort", "duration", "timeout"],
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
+        factors = self.chance(at, members)
+        if not may_time_out(factors, "timeout" in members):
+            message = "outcomes of a time-out belong into one distribution of an action that has one"
+            raise at.fault("BBT0604", message)
         return GroundAction(
             schema,
             args,
             self.condition(members["precondition"]),
-            self.chance(at, members),
+            factors,
             members["cost"].given(),
-            tuple(self.change(each) for each in _optional(members, "changes")),
+            tuple(self.change(each) for each in optional(members, "changes")),
+            during=self.condition(members["while"]) if "while" in members else None,
+            on_abort=self._abort(members["on_abort"]) if "on_abort" in members else (),
+            duration=duration_from_json(members["duration"]) if "duration" in members else None,
+            timeout=timeout_from_json(members["timeout"]) if "timeout" in members else None,
         )
+
+    def _abort(self, at: At) -> tuple[Factor, ...]:
+        return self.chance(at, at.members([], ["outcomes", "factors", "oneof"]))
+
+    def event(self, at: At) -> GroundEvent:
+        members = at.members(
+            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round"]
+        )
+        schema, args = members["schema"].string(), members["args"].strings()
+        _check_name(members["name"], schema, args)
+        number = members["round"].value if "round" in members else 0
+        if isinstance(number, bool) or not isinstance(number, int) or number < 0:
+            raise members["round"].fault("BBT0604", "must be the number of a round, from 0 on")
+        factors = self.chance(at, members)
+        return GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
         """The factors of an object with either ``outcomes`` or ``factors``."""
@@ -490,7 +484,7 @@ class _Reader:
             raise at.fault("BBT0603", "either 'outcomes' or 'factors' must be there, not both")
         lists = members["factors"].elements() if "factors" in members else [members["outcomes"]]
         unknown: set[int] = set()
-        for element in _optional(members, "oneof"):
+        for element in optional(members, "oneof"):
             number = element.value
             if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(lists):
                 raise element.fault("BBT0604", f"must be the number of a factor, below {len(lists)}")
@@ -503,7 +497,9 @@ class _Reader:
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:
-        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges", "numbers"])
+        members = at.members(
+            ["p", "effects"], ["factors", "oneof", "reward", "cost", "charges", "timed_out", "numbers"]
+        )
         if depth > MAX_NESTING:
             raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
         outcome = Outcome(
@@ -512,11 +508,12 @@ class _Reader:
             self.chance(at, members, depth + 1) if "factors" in members or "oneof" in members else (),
             members["reward"].given() if "reward" in members else _ZERO,
             members["cost"].given() if "cost" in members else _ZERO,
-            tuple(self._charge(element) for element in _optional(members, "charges")),
+            tuple(self._charge(element) for element in optional(members, "charges")),
+            "timed_out" in members and members["timed_out"].flag(),
         )
         if "numbers" not in members:
             return outcome
-        changes = changes_from_json(members["numbers"], self.numbers, self.condition)
+        changes = numbers_json.changes_from_json(members["numbers"], self.numbers, self.condition)
         sizes = {number.digits: number.high - number.low + 1 for number in self.numbers.values()}
         return with_digit_effects(replace(outcome, changes=changes), sizes)
 
@@ -546,8 +543,14 @@ class _Reader:
         )
 
     def _body(self, at: At, level: int) -> Body:
-        kind = kind_at(at, "sequence", "fallback", "skipper", "condition", "action", "template")
+        kind = kind_at(at, *_BODIES)
         match kind:
+            case "retry-until-success":
+                members = at.members(["type", "attempts", "children"])
+                tried = children_at(members["children"], level)
+                if len(tried) != 1:
+                    raise members["children"].fault("BBT0613", "what is tried again is one child")
+                return BodyControl(kind, (self._body(tried[0], level + 1),), members["attempts"].count())
             case "sequence" | "fallback" | "skipper":
                 children = children_at(at.members(["type", "children"])["children"], level)
                 return BodyControl(kind, tuple(self._body(child, level + 1) for child in children))
@@ -562,7 +565,7 @@ class _Reader:
 def _check_templates(members: Mapping[str, At], task: Task, faults: Faults) -> None:
     if not task.templates:
         return
-    _check_distinct(members["templates"], [template.name for template in task.templates])
+    check_distinct(members["templates"], [template.name for template in task.templates])
     try:
         active = active_templates(task.template_by_name)
     except BbtcError as error:

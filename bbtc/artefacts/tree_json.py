@@ -26,6 +26,7 @@ from bbtc.artefacts.task_json import (
     task_to_json,
 )
 from bbtc.diagnostics import Unreadable
+from bbtc.durations import LONGEST
 from bbtc.ground.condition import TRUE
 from bbtc.ground.task import Task
 from bbtc.source import SourceFile
@@ -37,6 +38,7 @@ from bbtc.tree.nodes import (
     ControlNode,
     Node,
     PlanStatus,
+    SuccessBy,
     Tree,
     actions_of,
 )
@@ -79,6 +81,10 @@ def tree_to_json(tree: Tree) -> Json:
     }
     if tree.bounds is not None:
         value["bounds"] = dict(zip(_BOUNDS, map(figure_text, tree.bounds), strict=True))
+    if tree.success_by is not None:
+        by = tree.success_by
+        ends = {"at_least": figure_text(by.at_least), "at_most": figure_text(by.at_most)}
+        value["success_by"] = {"seconds": given_text(by.seconds), **ends}
     return value | {"root": _node_to_json(tree.root, task), "task": task_to_json(task)}
 
 
@@ -120,7 +126,7 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
     check_header(at, FORMAT, VERSION)
     members = at.members(
         ["format", "version", "domain", "problem", "success_probability", "status", "root"],
-        ["target", "bounds", "task"],
+        ["target", "bounds", "success_by", "task"],
     )
     if task is None:
         if "task" not in members:
@@ -139,6 +145,7 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
         ),
         faults.attempt(lambda: _STATUSES[members["status"].word(*_STATUSES)], "stuck"),
         faults.attempt(lambda: _bounds(members["bounds"]) if "bounds" in members else None, None),
+        success_by=faults.attempt(lambda: _success_by(members.get("success_by")), None),
     )
     for field, expected in (("domain", task.domain), ("problem", task.problem)):
         if faults.attempt(members[field].string, expected) != expected:
@@ -147,6 +154,19 @@ def _read_tree(at: At, task: Task | None, faults: Faults) -> Tree:
     for problem in tree_problems(tree):
         faults.add(at_node(problem, members["root"].path))
     return tree
+
+
+def _success_by(at: At | None) -> SuccessBy | None:
+    if at is None:
+        return None
+    members = at.members(["seconds", "at_least", "at_most"])
+    seconds = members["seconds"].given()
+    if not 0 < seconds <= LONGEST:
+        raise members["seconds"].fault("BBT0604", "a deadline is a number of seconds above 0")
+    least, most = members["at_least"].probability(), members["at_most"].probability()
+    if least > most:
+        raise at.fault("BBT0604", "the lower bound is above the upper one")
+    return SuccessBy(seconds, least, most)
 
 
 def _bounds(at: At) -> tuple[Fraction, Fraction]:

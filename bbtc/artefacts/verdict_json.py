@@ -9,6 +9,7 @@ from bbtc.artefacts.numbers import figure_text
 
 if TYPE_CHECKING:
     from bbtc.verifier.solve import Recomputed
+    from bbtc.verifier.timed import TimeFound
     from bbtc.verifier.verdict import StormFigures, Verdict
 
 _FIGURES = (
@@ -39,6 +40,7 @@ def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
         "own": None if verdict.own is None else _own(verdict.own),
         **({"worlds": _worlds(verdict.worlds)} if verdict.hidden else {}),
         "storm": None if verdict.storm is None else _storm(verdict.storm),
+        **({} if verdict.time is None else {"time": _time(verdict.time)}),
         "problems": [{"code": problem.code, "message": problem.message} for problem in verdict.problems],
     }
 
@@ -46,6 +48,11 @@ def verdict_to_json(verdict: Verdict) -> dict[str, Any]:
 def _own(found: Recomputed) -> dict[str, Any]:
     figures: dict[str, Any] = {name: _figure(found.figure(name)) for name in _FIGURES}
     return figures | {"states": found.states}
+
+
+def _time(found: TimeFound) -> dict[str, Any]:
+    expected = {"expected": _figure(found.expected), "given_success": _figure(found.given_success)}
+    return expected | ({} if found.by is None else {"success_by": list(found.by)})
 
 
 def _worlds(found: Recomputed | None) -> dict[str, Any] | None:

@@ -38,11 +38,16 @@ def relevant_variables(tree: Tree) -> list[int]:
             found.update(variables(normal(task, node.condition)))
         elif isinstance(node, ActionNode):
             found.update(variables(guard_of(task, node) or TRUE))
-    for action in actions_used(tree):
-        for effect in effects_of(action.factors):
-            found.update(index for index, _ in effect.sets)
-            if effect.when is not None:
-                found.update(variables(normal(task, effect.when)))
+    factors = [factor for action in actions_used(tree) for factor in action.possible_factors]
+    for action in actions_used(tree) if task.events else ():
+        found.update(variables(normal(task, action.during or TRUE)))
+    for event in task.events:
+        found.update(variables(normal(task, event.precondition)))
+        factors += event.factors
+    for effect in effects_of(factors):
+        found.update(index for index, _ in effect.sets)
+        if effect.when is not None:
+            found.update(variables(normal(task, effect.when)))
     if tree.monitor is not None:
         found |= tree.monitor.seen | tree.monitor.known | tree.monitor.drawn
         for telling in tree.monitor.tellings:

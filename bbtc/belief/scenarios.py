@@ -35,6 +35,8 @@ class Scenario:
     status: NodeStatus
     end: int
     """The state of the chain that it ends in."""
+    visited: tuple[int, ...] = ()
+    """All of them, in order."""
 
     @property
     def final(self) -> Values:
@@ -135,6 +137,7 @@ def _scenario(chain: Chain, probability: Fraction, path: _Path) -> Scenario:
         ),
         status=chain.status[visited[-1]],
         end=visited[-1],
+        visited=tuple(visited),
     )
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import Draw, Values, add, compile_factor, product_of
 from bbtc.belief.hidden import compile_change, told_first
-from bbtc.ground.task import NO_CHANGE, ZERO, GroundAction, Task
+from bbtc.ground.condition import compile_condition
+from bbtc.ground.task import NO_CHANGE, ONE, ZERO, GroundAction, GroundEvent, Task
+from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.markov import distribution
 
@@ -69,22 +71,89 @@ class Bounded:
 
 
 def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transition:
-    """An action of the task as a function from values to its results: equal results merged, most probable
-    first (ties by values). Results are cached per assignment. The function raises
-    :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on states, or
-    for longer than time and memory allow."""
+    """An action of the task, and the events that happen with it, as a function from values to the results:
+    equal results merged, most probable first (ties by values). Results are cached per assignment. The
+    function raises :class:`bbtc.diagnostics.LimitReached` where outcomes combine to more than the limit on
+    states, or for longer than time and memory allow."""
     bounded = Bounded(limits)
+    own = _compile_own(task, action, bounded)
+    if not task.events and action.during is None:
+        return own
+    events = _compile_events(task, bounded)
+    if action.during is None:
+        return _cached(lambda values: _merged(_then(own(values), events), bounded))
+    goes_on, abort = compile_condition(action.during), _compile_abort(action, bounded)
+
+    def interrupted(values: Values) -> tuple[Result, ...]:
+        return own(values) if goes_on(values) == Truth.TRUE else abort(values)
+
+    return _cached(lambda values: _merged(_then(events(values), interrupted), bounded))
+
+
+def _compile_own(task: Task, action: GroundAction, bounded: Bounded) -> Transition:
+    """What an action does by itself."""
     factors = (factor for factor in action.factors if factor != NO_CHANGE)
     drawers = [compile_factor(factor, bounded.spend) for factor in factors]
     drawers += [compile_change(task, change, bounded.spend) for change in action.changes]
+    return _cached(lambda values: results_of(values, action.cost, product_of(values, drawers, bounded.spend)))
+
+
+def _compile_abort(action: GroundAction, bounded: Bounded) -> Transition:
+    """What an action does where it is aborted."""
+    drawers = [compile_factor(factor, bounded.spend) for factor in action.on_abort]
+    return _cached(lambda values: results_of(values, action.cost, product_of(values, drawers, bounded.spend)))
+
+
+def _compile_events(task: Task, bounded: Bounded) -> Transition:
+    """The events of one draw, round by round."""
+
+    def compile_round(events: tuple[GroundEvent, ...]) -> Transition:
+        compiled = [
+            (compile_condition(event.precondition), [compile_factor(f, bounded.spend) for f in event.factors])
+            for event in events
+        ]
+
+        def happen(values: Values) -> tuple[Result, ...]:
+            due = (each for ready, drawers in compiled if ready(values) == Truth.TRUE for each in drawers)
+            return results_of(values, ZERO, product_of(values, due, bounded.spend))
+
+        return _cached(happen)
+
+    rounds = [compile_round(events) for events in task.rounds]
+
+    def all_rounds(values: Values) -> tuple[Result, ...]:
+        results: tuple[Result, ...] = (Result(ONE, ZERO, ZERO, values),)
+        for happen in rounds:
+            results = _merged(_then(results, happen), bounded)
+        return results
+
+    return _cached(all_rounds) if len(rounds) > 1 else rounds[0] if rounds else all_rounds
+
+
+def _then(results: Iterable[Result], after: Transition) -> Iterator[Result]:
+    """What follows from each result, in turn."""
+    for probability, cost, reward, values in results:
+        for each in after(values):
+            yield Result(probability * each.probability, cost + each.cost, reward + each.reward, each.values)
+
+
+def _merged(results: Iterable[Result], bounded: Bounded) -> tuple[Result, ...]:
+    """Equal results merged, the most probable first."""
+    merged: dict[tuple[Values, Fraction, Fraction], Fraction] = {}
+    for work, (probability, cost, reward, values) in enumerate(results, 1):
+        add(merged, (values, cost, reward), probability)
+        if work % _LOOK == 0:
+            bounded.spend(_LOOK + 1, len(merged))
+    return _ranked(merged)
+
+
+def _cached(compute: Transition) -> Transition:
     cache: dict[Values, tuple[Result, ...]] = {}
 
     def results(values: Values) -> tuple[Result, ...]:
         known = cache.get(values)
         if known is None:
-            known = cache[values] = results_of(
-                values, action.cost, product_of(values, drawers, bounded.spend)
-            )
+            known = cache[values] = compute(values)
         return known
 
     return results
@@ -101,6 +170,10 @@ def results_of(values: Values, cost: Fraction, draws: dict[Draw, Fraction]) -> t
             after[variable] = value
         key = (bytes(after), cost if extra is ZERO else cost + extra, reward)
         add(merged, key, probability)
+    return _ranked(merged)
+
+
+def _ranked(merged: Mapping[tuple[Values, Fraction, Fraction], Fraction]) -> tuple[Result, ...]:
     results = [Result(p, c, r, v) for (v, c, r), p in merged.items()]
     if len(results) > 1:
         results.sort(key=lambda r: (r.values, r.cost, r.reward))

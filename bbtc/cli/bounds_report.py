@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from bbtc.artefacts.numbers import exact, figure_text
 from bbtc.cli.counting import counted
-from bbtc.cli.wording import at, block_line, oneof_note, steps_of, within
+from bbtc.cli.wording import at, block_line, external_note, oneof_note, steps_of, within
 from bbtc.ground.describe import describe
 from bbtc.ground.task import Task
 from bbtc.printable import printable
@@ -48,6 +48,9 @@ def bounds_report(task: Task, value: TaskValue, target: Fraction) -> str:
     note = oneof_note(task)
     if note:
         lines.append(f"oneof: {note}")
+    note = external_note(task)
+    if note:
+        lines.append(f"external: {note}")
     if value.stop is not None:
         lines.append(value.stop.message)
     if value.interrupted:

@@ -237,6 +237,27 @@ class Probability(click.ParamType):  # type: ignore[type-arg,unused-ignore]
             self.fail(str(error), param, ctx)
 
 
+class Time(click.ParamType):  # type: ignore[type-arg,unused-ignore]
+    """An exact number of seconds above 0: ``0.5``, ``120``, ``1/3``."""
+
+    name = "seconds"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Fraction:
+        """The value as a rational; anything else is wrong usage."""
+        if isinstance(value, Fraction):
+            return value
+        from bbtc.artefacts.numbers import parse_written
+        from bbtc.durations import LONGEST
+
+        try:
+            seconds = parse_written(str(value), "a number of seconds such as 120 or 0.5")
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+        if not 0 < seconds <= LONGEST:
+            self.fail(f"{value} is not above 0 and at most {LONGEST} seconds", param, ctx)
+        return seconds
+
+
 def output_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """``-o``, ``--check`` and ``--depfile``."""
     for option in (

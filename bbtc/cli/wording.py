@@ -10,8 +10,8 @@ from bbtc.artefacts.numbers import exact
 from bbtc.belief.tick import NodeStatus
 from bbtc.cli.counting import counted
 from bbtc.ground.condition import Condition
-from bbtc.ground.describe import describe
-from bbtc.ground.task import Factor, Task, differences
+from bbtc.ground.describe import describe, differences
+from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
 from bbtc.printable import printable
 from bbtc.source import Span
@@ -114,6 +114,14 @@ def oneof_note(task: Task) -> str:
     return f"outcomes of {listed}{more} count as equally likely" if names else ""
 
 
+def external_note(task: Task) -> str:
+    """Which facts others may change though figures take them to stay; empty where there are none."""
+    names = list(dict.fromkeys(variable.predicate for variable in task.variables if variable.external))
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    listed = printable(", ".join(names[:_MOST_NAMED]))
+    return f"others may change {listed}{more}; figures take it that they do not" if names else ""
+
+
 def _has_oneof(factor: Factor) -> bool:
     return factor.oneof or any(_has_oneof(inner) for each in factor.outcomes for inner in each.factors)
 
@@ -164,6 +172,9 @@ def figures_report(tree: Tree, figures: Figures) -> list[str]:
     note = oneof_note(tree.task)
     if note:
         lines.append(f"oneof     {note}")
+    note = external_note(tree.task)
+    if note:
+        lines.append(f"external  {note}")
     return lines
 
 

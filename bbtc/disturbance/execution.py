@@ -1,12 +1,12 @@
 """Actions as a disturbed world runs them: one that starts without its precondition does nothing.
 
 The model says nothing of such a start, which a tree that was not planned for the state may make. It costs
-what the action costs, the tree remembers it as a start like any other, and the world stays as it is.
+what the action costs, the tree remembers it as a start like any other, and only events change the world.
 """
 
 from __future__ import annotations
 
-from fractions import Fraction
+from dataclasses import replace
 
 from bbtc.belief.draws import Values
 from bbtc.belief.state import Result, Transition, compile_action
@@ -26,10 +26,9 @@ def careful_actions(task: Task, root: Node, limits: Limits) -> dict[str, Transit
 
 def _careful(task: Task, action: GroundAction, limits: Limits) -> Transition:
     ready, run = compile_condition(action.precondition), compile_action(task, action, limits)
+    idle = compile_action(task, replace(action, factors=(), changes=(), during=None), limits)
 
     def results(values: Values) -> tuple[Result, ...]:
-        if ready(values) == Truth.TRUE:
-            return run(values)
-        return (Result(Fraction(1), action.cost, Fraction(0), values),)
+        return run(values) if ready(values) == Truth.TRUE else idle(values)
 
     return results

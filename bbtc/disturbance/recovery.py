@@ -28,6 +28,7 @@ from bbtc.ground.condition import FALSE, Condition, compile_condition, conjuncti
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
+from bbtc.planner.mdp.contraction import contracted
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.maxprob import MaxProb, max_prob
 from bbtc.planner.mdp.packing import bit_test, holds
@@ -112,6 +113,7 @@ def recovery(
         raise ValueError("there must be at least one sample")
     space = explore_space(replace(task, goal=FALSE), limits)  # so that the goal ends nothing
     space.require_complete()
+    space = contracted(space, limits)
     best = max_prob(space, limits, holds(space.packing, bit_test(space.packing, task.goal), space.states))
     rows = _taken(len(space.states), samples, seed)
     hopeful = [row for row in rows if best.bounds(row).upper]

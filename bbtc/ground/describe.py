@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from typing_extensions import assert_never
 
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within
-from bbtc.ground.task import Digit, Task, Variable, ground_name
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, number_in
+from bbtc.ground.task import Digit, Task, Variable, ground_name, numbers_of
 from bbtc.kleene import Truth
 
 
@@ -101,3 +101,23 @@ def _compared(
     if most == digit.high:
         return f"{name} >= {least}"
     return f"{name} <= {most}" if least == digit.low else f"{least} <= {name} <= {most}"
+
+
+def values_in_words(variables: Sequence[Variable], values: Sequence[int]) -> dict[str, str | int]:
+    """The value of each variable, and of each number, by name, in the order of the variables."""
+    numbers = {number.digits[0]: number for number in numbers_of(variables)}
+    found: dict[str, str | int] = {}
+    for index, (variable, value) in enumerate(zip(variables, values, strict=False)):
+        if variable.digit is None:
+            found[variable.name] = Truth(value).word
+        elif index in numbers:
+            found[numbers[index].name] = numbers[index].low + number_in(numbers[index].digits, values)
+    return found
+
+
+def differences(
+    variables: Sequence[Variable], before: Sequence[int], after: Sequence[int]
+) -> dict[str, str | int]:
+    """What differs between two states, with its value in the second."""
+    one, other = values_in_words(variables, before), values_in_words(variables, after)
+    return {name: value for name, value in other.items() if one[name] != value}

@@ -24,12 +24,15 @@ from itertools import repeat
 
 from typing_extensions import assert_never
 
+from bbtc import durations
 from bbtc.diagnostics import Report
-from bbtc.ground.condition import FALSE, TRUE, Condition, conjunction
-from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
+from bbtc.durations import Duration, Empirical
+from bbtc.ground.condition import TRUE, Condition, conjunction
+from bbtc.ground.loops import Loop
+from bbtc.ground.lower import Env, Frame, Lowering, conjoin, projection
 from bbtc.ground.normal import Block, Chance, groups, reads
 from bbtc.ground.numbers.changes import Changes, Changing
-from bbtc.ground.reachability.atoms import Atoms, Scope
+from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.reachability.bulk import Shared
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
 from bbtc.ground.task import (
@@ -46,7 +49,6 @@ from bbtc.ground.task import (
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
-from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
 from bbtc.rounding import too_long
 from bbtc.source import Span
@@ -79,9 +81,9 @@ class _Part:
             self.charges[guard] = both
 
     def draw(self, factors: Iterable[Factor]) -> None:
-        """Draw further factors; what is certain of them is no draw (rule 7)."""
+        """Draw further factors; what is certain of them is no draw (rule 7), unless it is a time-out."""
         for factor in factors:
-            if len(factor.outcomes) > 1:
+            if len(factor.outcomes) > 1 or factor.outcomes[0].timed_out:
                 self.factors.append(factor)
             else:
                 _absorb(self, factor.outcomes[0])
@@ -90,7 +92,7 @@ class _Part:
         """All of it as one outcome, with further draws."""
         charges = tuple(Charge(guard, cost, reward) for guard, (cost, reward) in self.charges.items())
         changes = tuple(self.changes)
-        return Outcome(probability, self.effects(), factors, self.reward, self.cost, charges, changes)
+        return Outcome(probability, self.effects(), factors, self.reward, self.cost, charges, changes=changes)
 
     def effects(self) -> tuple[Effect, ...]:
         """The settings as effects, unconditional ones first, in order of variables."""
@@ -98,77 +100,6 @@ class _Part:
         return tuple(
             Effect(None if guard is TRUE else guard, tuple(sorted(sets.items()))) for guard, sets in ordered
         )
-
-
-# --- quantifiers with guards -------------------------------------------------------------------
-
-
-class _Loop:
-    """The bindings of some parameters under which a guard may be true. Each part of the guard is
-    looked at as soon as what it reads is bound."""
-
-    def __init__(
-        self,
-        lowering: Lowering,
-        frame: Frame,
-        parameters: tuple[Parameter, ...],
-        guard: tuple[mf.Formula, ...],
-    ) -> None:
-        self._spend = lowering.spend
-        pending = list(guard)
-        later = {parameter.name for parameter in parameters}
-        self._first = self._lower(lowering, frame, _ready(pending, later))
-        self._levels: list[tuple[int, Callable[[Env], Sequence[int]], list[Lowered]]] = []
-        for parameter in parameters:
-            later.discard(parameter.name)
-            slot, parts = frame.slot(parameter.name), _ready(pending, later)
-            members = lowering.members(parameter, parts, frame)
-            self._levels.append((slot, members, self._lower(lowering, frame, parts)))
-        self.trivial = not self._levels and not self._first
-
-    @staticmethod
-    def _lower(lowering: Lowering, frame: Frame, parts: list[mf.Formula]) -> list[Lowered]:
-        return [lowering.normal(part, frame, Scope.TRUTH) for part in parts]
-
-    def guards(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
-        """For each binding, which is then in ``env``: the guard's conditions (no constants),
-        together with those above."""
-        conditions = _met(self._first, env, above)
-        if conditions is not None:
-            yield from self._enter(0, env, conditions)
-
-    def _enter(self, level: int, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
-        if level == len(self._levels):
-            yield above
-            return
-        slot, members_of, parts = self._levels[level]
-        members = members_of(env)
-        self._spend(len(members))
-        for env[slot] in members:  # 1
-            conditions = _met(parts, env, above)
-            if conditions is not None:
-                yield from self._enter(level + 1, env, conditions)
-
-
-def _ready(pending: list[mf.Formula], later: set[str]) -> list[mf.Formula]:
-    """The parts that can be looked at before what comes later is bound; they are pending no more."""
-    ready = [part for part in pending if later.isdisjoint(mf.free(part))]
-    pending[:] = [part for part in pending if not later.isdisjoint(mf.free(part))]
-    return ready
-
-
-def _met(parts: list[Lowered], env: Env, above: list[Condition]) -> list[Condition] | None:
-    """The conditions of the parts after those above; None if one is false."""
-    if not parts:
-        return above
-    found = list(above)
-    for part in parts:
-        condition = part(env)
-        if condition is FALSE:  # 2
-            return None
-        if condition is not TRUE:
-            found.append(condition)
-    return found
 
 
 # --- compiled effects ----------------------------------------------------------------------------
@@ -211,11 +142,11 @@ class LoweredEffect:
         self._span = span
         self._frame = frame
         self._costs: list[_Addition] = []
-        self._groups: list[tuple[_Loop, list[_Leaf]]] = []
+        self._groups: list[tuple[Loop, list[_Leaf]]] = []
         lowering = owner.lowering
         always: list[me.Set] = []
         for group in groups(block):
-            loop = _Loop(lowering, frame, group.parameters, group.guard)
+            loop = Loop(lowering, frame, group.parameters, group.guard)
             leaves: list[_Leaf] = []
             for leaf in group.leaves:
                 match leaf:
@@ -242,7 +173,7 @@ class LoweredEffect:
     def _plain_draw(self, owner: EffectLowering, block: Block, always: list[me.Set]) -> _Draw | None:
         """The only chance, if its branches do nothing but set variables."""
         (chance,) = block.chances
-        if chance.parameters or chance.guard:
+        if chance.parameters or chance.guard or chance.timeout is not None:
             return None
         branches = []
         for probability, branch in chance.branches:
@@ -419,9 +350,10 @@ class _LoweredChance:
     """A compiled chance."""
 
     def __init__(self, owner: EffectLowering, chance: Chance, frame: Frame) -> None:
-        self._loop = _Loop(owner.lowering, frame, chance.parameters, chance.guard)
+        self._loop = Loop(owner.lowering, frame, chance.parameters, chance.guard)
         self._branches = [(p, LoweredEffect(owner, block, frame)) for p, block in chance.branches]
         self._oneof = chance.oneof
+        self._timeout = None if chance.timeout is None else LoweredTimeOut(owner, chance.timeout, frame)
 
     def settings(self, env: Env, above: list[Condition]) -> Iterator[tuple[int, list[Condition]]]:
         """Every variable that some branch may set, with the conditions under which it does."""
@@ -439,7 +371,7 @@ class _LoweredChance:
         """One draw for every binding."""
         for conditions in self._loop.guards(env, above):
             outcomes: list[Outcome] = []
-            for probability, branch in self._branches:
+            for probability, branch in self._branches if self._timeout is None else self._given_up(env):
                 part = branch.part(env, conditions)  # 3
                 if len(part.factors) == 1 and part.factors[0].oneof == self._oneof:  # 5
                     for inner in part.factors[0].outcomes:
@@ -447,10 +379,62 @@ class _LoweredChance:
                         outcomes.append(replace(joined, probability=joined.probability * probability))
                 else:
                     outcomes.append(part.outcome(probability, tuple(part.factors)))
+                if self._timeout is not None and branch is self._branches[0][1]:
+                    outcomes = [replace(each, timed_out=True) for each in outcomes]
             yield Factor(merge_outcomes(outcomes), self._oneof)
+
+    def _given_up(self, env: Env) -> list[tuple[Fraction, LoweredEffect]]:
+        """The branches of a time-out that can be, with their probabilities."""
+        assert self._timeout is not None
+        late = self._timeout.probability(env)
+        both = zip((late, 1 - late), self._branches, strict=True)
+        return [(probability, branch) for probability, (_, branch) in both if probability]
 
 
 # --- numbers -------------------------------------------------------------------------------------
+
+
+class LoweredDuration:
+    """A compiled duration. What makes no sense is reported, and takes no time."""
+
+    def __init__(self, owner: EffectLowering, duration: me.LiftedDuration, frame: Frame) -> None:
+        self._owner = owner
+        self._duration = duration
+        self._amounts = [_Amounts(owner, frame).lower(amount) for amount in duration.amounts]
+
+    def of(self, env: Env) -> Duration:
+        """The duration in an environment."""
+        found = me.duration_of(self._duration, [each(env) for each in self._amounts])
+        wrong = durations.problem(found)
+        if wrong is not None:
+            self._owner.report.error("BBT0443", wrong, self._duration.span)
+            return durations.INSTANT
+        return durations.plain(durations.empirical(found.points) if isinstance(found, Empirical) else found)
+
+
+class LoweredTimeOut:
+    """A compiled time-out."""
+
+    def __init__(self, owner: EffectLowering, timeout: me.TimeOut, frame: Frame) -> None:
+        self._owner = owner
+        self._timeout = timeout
+        self._amount = _Amounts(owner, frame).lower(timeout.seconds)
+        self._duration = None if timeout.duration is None else LoweredDuration(owner, timeout.duration, frame)
+
+    def seconds(self, env: Env) -> Fraction:
+        """After so many seconds the action is given up."""
+        seconds = self._amount(env)
+        if not 0 < seconds <= durations.LONGEST:
+            wrong = "is not above 0" if seconds <= 0 else "is too long"
+            self._owner.report.error("BBT0444", f"a time-out {wrong}", self._timeout.span)
+            return ONE
+        return seconds
+
+    def probability(self, env: Env) -> Fraction:
+        """How probably it comes to that."""
+        if self._duration is None:
+            return ZERO if self._timeout.probability is None else self._timeout.probability
+        return durations.exceeding(self._duration.of(env), self.seconds(env))
 
 
 class _Amounts:
@@ -476,6 +460,9 @@ class _Amounts:
     def _value(self, amount: me.FunctionValue) -> Callable[[Env], Fraction]:
         universe, numbers = self._owner.atoms.universe, self._owner.atoms.model.init.numbers
         rows = self._frame.rows(amount.args)
+        if self._owner.changes.depends(amount):
+            message = f"`{amount.function}` changes, and what is worked out here may not"
+            self._owner.report.error("BBT0440", message, amount.span)
 
         def value(env: Env) -> Fraction:
             args = universe.args(rows(env))
@@ -533,7 +520,7 @@ def _join(part: _Part, outcome: Outcome) -> Outcome:
     sets = {guard: dict(sets) for guard, sets in part.sets.items()}
     both = _Part(sets, part.cost, part.reward, dict(part.charges), changes=list(part.changes))
     _absorb(both, outcome)
-    return both.outcome(outcome.probability, tuple(both.factors))
+    return replace(both.outcome(outcome.probability, tuple(both.factors)), timed_out=outcome.timed_out)
 
 
 def _arranged(part: _Part) -> tuple[Factor, ...]:

@@ -214,7 +214,7 @@ def _meant(reached: Reach, fact: Fact) -> str:
 def _conditions(model: md.Model) -> Iterator[mf.Formula]:
     for schema in model.schemas.values():
         yield schema.precondition
-        yield from me.conditions(schema.effect)
+        yield from me.conditions(schema.effects)
     yield from (rule.condition for rule in model.rules)
     if model.goal is not None:
         yield model.goal

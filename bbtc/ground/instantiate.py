@@ -7,9 +7,9 @@ from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.hidden.compile import hidden_task
 from bbtc.ground.numbers.digits import with_digits
-from bbtc.ground.prune import prune
+from bbtc.ground.pruning.prune import prune
+from bbtc.ground.pruning.relevance import Relevance
 from bbtc.ground.reachability.atoms import Atoms
-from bbtc.ground.relevance import Relevance
 from bbtc.ground.task_builder import TaskBuilder, goal_of, reached_from
 from bbtc.limits import Limits
 from bbtc.model import domain as md

@@ -58,6 +58,8 @@ class Chance:
     guard: tuple[mf.Formula, ...]
     branches: tuple[tuple[Fraction, Block], ...]
     oneof: bool
+    timeout: me.TimeOut | None = None
+    """What the probabilities follow from, if they are not those of the branches."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,9 @@ def _walk(
             _walk(inner, parameters, (*guard, *conjuncts(normal_form(condition))), items, chances)
         case me.ForEach(more, inner):  # 3, 4
             _walk(inner, parameters + more, guard, items, chances)
+        case me.Choice(branches, _, _, me.TimeOut() as timeout):
+            drawn = tuple((branch.probability, normalise(branch.effect)) for branch in branches)
+            chances.append(Chance(parameters, guard, drawn, False, timeout))
         case me.Choice(branches, oneof):
             possible = [branch for branch in branches if branch.probability > 0]  # 5
             if len(possible) == 1:  # 6
@@ -147,6 +152,15 @@ def reads(block: Block) -> Iterator[str]:
             yield from mf.free(part)
         for _, branch in chance.branches:
             yield from reads(branch)
+        if chance.timeout is not None:
+            yield from timing_terms(chance.timeout.duration, chance.timeout)
+
+
+def timing_terms(duration: me.LiftedDuration | None, timeout: me.TimeOut | None) -> Iterator[str]:
+    """The terms of a duration and of a time-out."""
+    amounts = () if duration is None else duration.amounts
+    for amount in amounts if timeout is None else (*amounts, timeout.seconds):
+        yield from _terms(amount)
 
 
 def _terms(amount: me.Amount) -> Iterator[str]:

@@ -27,6 +27,7 @@ def reordered(task: gt.Task, order: Sequence[int]) -> gt.Task:
         initial=tuple(gt.InitialState(probability, values) for values, probability in initial.items()),
         goal=mapper.condition(task.goal),
         actions=tuple(map(mapper.action, task.actions)),
+        events=tuple(map(mapper.event, task.events)),
         templates=tuple(map(mapper.template, task.templates)),
         components=tuple(map(mapper.component, task.components)),
     )
@@ -101,6 +102,16 @@ class Renumbering:
             precondition=self.condition(action.precondition),
             factors=self.factors(action.factors) or (gt.NO_CHANGE,),
             changes=tuple(replace(change, seen=self._seen(change.seen)) for change in action.changes),
+            during=None if action.during is None else self.condition(action.during),
+            on_abort=self.factors(action.on_abort),
+        )
+
+    def event(self, event: gt.GroundEvent) -> gt.GroundEvent:
+        """The event over the kept variables."""
+        return replace(
+            event,
+            precondition=self.condition(event.precondition),
+            factors=self.factors(event.factors) or (gt.NO_CHANGE,),
         )
 
     def component(self, component: gt.Component) -> gt.Component:
@@ -122,8 +133,8 @@ class Renumbering:
 
     def _body(self, body: gt.Body) -> gt.Body:
         match body:
-            case gt.BodyControl(kind, children):
-                return gt.BodyControl(kind, tuple(self._body(child) for child in children))
+            case gt.BodyControl(_, children):
+                return replace(body, children=tuple(self._body(child) for child in children))
             case gt.BodyCondition(condition):
                 return gt.BodyCondition(self.condition(condition))
             case gt.BodyAction() | gt.BodyTemplate():

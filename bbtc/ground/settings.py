@@ -133,6 +133,8 @@ def _factors(branches: list[tuple[Fraction, list[Pairs]]], *, oneof: bool) -> li
         if not all(sets):
             effects = [made if each else () for made, each in zip(effects, sets, strict=True)]
         outcomes.append(
-            instances(Outcome, size, repeat(probability), effects, none, zeros, zeros, none, none)
+            instances(
+                Outcome, size, repeat(probability), effects, none, zeros, zeros, none, repeat(False), none
+            )
         )
     return list(zip(instances(Factor, size, zip(*outcomes, strict=True), repeat(oneof))))

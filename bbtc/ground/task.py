@@ -13,7 +13,8 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
-from bbtc.ground.condition import Condition, number_in
+from bbtc.durations import Duration
+from bbtc.ground.condition import Condition
 from bbtc.kleene import Truth
 from bbtc.source import Span
 
@@ -71,8 +72,9 @@ class NumberVariable:
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown. Of a number it is a
-    ``digit``, which is true where it is 1."""
+    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
+    others change it, of whom the task knows nothing. Of a number it is a ``digit``, which is true where it
+    is 1."""
 
     predicate: str
     args: tuple[str, ...]
@@ -80,6 +82,7 @@ class Variable:
     hidden: bool = False
     digit: Digit | None = None
     span: Span | None = field(default=None, compare=False, repr=False)
+    external: bool = False
 
     @property
     def name(self) -> str:
@@ -145,6 +148,8 @@ class Outcome:
     reward: Fraction = Fraction(0)
     cost: Fraction = Fraction(0)
     charges: tuple[Charge, ...] = ()
+    timed_out: bool = False
+    """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
     changes: tuple[NumberChange, ...] = ()
 
 
@@ -253,7 +258,15 @@ class GroundAction:
     """A schema with its arguments. One outcome of every factor happens, independently; all
     conditions are read before any effect. Where effects of one occurrence set a variable to
     different values, the Kleene maximum wins (delete before forget before add). ``changes`` tells what
-    happens to hidden facts, at most one a component, independently of each other and of the factors."""
+    happens to hidden facts, at most one a component, independently of each other and of the factors.
+
+    Where there is ``during``, events are drawn while the action goes on, and not after it: it goes on where
+    that condition, which its precondition implies, is true then, and else ends with ``on_abort``.
+
+
+    ``duration`` is how long it takes, drawn independently of the outcome (None: nobody says). After
+    ``timeout`` seconds it is given up: one factor then has an outcome ``timed_out``, unless that is
+    impossible, with the probability that it takes longer; the others are those of an action that does not."""
 
     schema: str
     args: tuple[str, ...]
@@ -262,11 +275,45 @@ class GroundAction:
     cost: Fraction = Fraction(1)
     changes: tuple[Change, ...] = ()
     span: Span | None = field(default=None, compare=False, repr=False)
+    during: Condition | None = None
+    on_abort: tuple[Factor, ...] = ()
+    duration: Duration | None = None
+    timeout: Fraction | None = None
 
     @property
     def name(self) -> str:
         """``schema(arg,…)``."""
         return ground_name(self.schema, self.args)
+
+    @property
+    def possible_factors(self) -> tuple[Factor, ...]:
+        """Its factors, and those of its end by ``during``: not all of them happen at once."""
+        return (*self.factors, *self.on_abort)
+
+
+@dataclass(frozen=True, slots=True)
+class GroundEvent:
+    """What happens by itself, once an action: where the precondition is true, one outcome of every factor.
+
+    The events of one ``round`` happen at once: all read the state that the action left, or the round before,
+    and no two of them set a variable to different values."""
+
+    schema: str
+    args: tuple[str, ...]
+    precondition: Condition
+    factors: tuple[Factor, ...]
+    round: int = 0
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """``schema(arg,…)``."""
+        return ground_name(self.schema, self.args)
+
+    @property
+    def possible_factors(self) -> tuple[Factor, ...]:
+        """Its factors."""
+        return self.factors
 
 
 # --- templates -------------------------------------------------------------------------------
@@ -274,10 +321,11 @@ class GroundAction:
 
 @dataclass(frozen=True, slots=True)
 class BodyControl:
-    """A control node of a template body."""
+    """A control node of a template body; a retry-until-success has one child, and ``attempts``."""
 
-    kind: Literal["sequence", "fallback", "skipper"]
+    kind: Literal["sequence", "fallback", "skipper", "retry-until-success"]
     children: tuple[Body, ...]
+    attempts: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,8 +402,8 @@ class TrueWorld:
 
 @dataclass(frozen=True)
 class Task:
-    """A ground planning task. Actions, templates and variables are sorted by name, signatures by
-    kind and symbol."""
+    """A ground planning task. Actions, templates and variables are sorted by name, events by round and name,
+    signatures by kind and symbol."""
 
     domain: str
     problem: str
@@ -380,6 +428,7 @@ class Task:
     true_worlds: tuple[TrueWorld, ...] = ()
     """What the problem says is true at the start of simulated runs, which begin in one of them. Nothing else
     reads it."""
+    events: tuple[GroundEvent, ...] = ()
     goal_span: Span | None = field(default=None, compare=False, repr=False)
 
     @cached_property
@@ -407,6 +456,19 @@ class Task:
         """Each action by its ground name."""
         return {action.name: action for action in self.actions}
 
+    @property
+    def occurrences(self) -> tuple[GroundAction | GroundEvent, ...]:
+        """Actions and events."""
+        return (*self.actions, *self.events)
+
+    @cached_property
+    def rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
+        """The events by round, in order."""
+        found: dict[int, list[GroundEvent]] = {}
+        for event in self.events:
+            found.setdefault(event.round, []).append(event)
+        return tuple(tuple(found[number]) for number in sorted(found))
+
     @cached_property
     def endless_beliefs(self) -> bool:
         """May ever new beliefs follow from each other, since readings are noisy or hidden facts change by
@@ -418,7 +480,7 @@ class Task:
     @cached_property
     def counts_reward(self) -> bool:
         """Is there anything that adds to the reward, or a metric of it?"""
-        outcomes = outcomes_of(factor for action in self.actions for factor in action.factors)
+        outcomes = outcomes_of(factor for each in self.occurrences for factor in each.possible_factors)
         return self.metric == "reward" or any(
             outcome.reward or any(charge.reward for charge in outcome.charges) for outcome in outcomes
         )
@@ -449,26 +511,6 @@ def digit_name(function: str, place: int) -> str:
     return f"{function} digit {place}"
 
 
-def values_in_words(variables: Sequence[Variable], values: Sequence[int]) -> dict[str, str | int]:
-    """The value of each variable, and of each number, by name, in the order of the variables."""
-    numbers = {number.digits[0]: number for number in numbers_of(variables)}
-    found: dict[str, str | int] = {}
-    for index, (variable, value) in enumerate(zip(variables, values, strict=False)):
-        if variable.digit is None:
-            found[variable.name] = Truth(value).word
-        elif index in numbers:
-            found[numbers[index].name] = numbers[index].low + number_in(numbers[index].digits, values)
-    return found
-
-
-def differences(
-    variables: Sequence[Variable], before: Sequence[int], after: Sequence[int]
-) -> dict[str, str | int]:
-    """What differs between two states, with its value in the second."""
-    one, other = values_in_words(variables, before), values_in_words(variables, after)
-    return {name: value for name, value in other.items() if one[name] != value}
-
-
 def _digits(variables: Sequence[Variable], indices: Iterable[int]) -> Iterator[tuple[int, Digit]]:
     for index in indices:
         digit = variables[index].digit
@@ -494,8 +536,8 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     merged: dict[tuple[object, ...], Outcome] = {}
     for outcome in outcomes:
         key = (
-            *(outcome.effects, outcome.factors, outcome.reward),
-            *(outcome.cost, outcome.charges, outcome.changes),
+            *(outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges),
+            *(outcome.timed_out, outcome.changes),
         )
         before = merged.get(key)
         if before is not None:
@@ -529,10 +571,13 @@ def seen_factors(task: Task, action: GroundAction) -> tuple[Factor, ...]:
     return tuple(found)
 
 
-def apparent_factors(task: Task, doing: GroundAction | GroundTemplate) -> tuple[Factor, ...]:
-    """:func:`seen_factors` and all that an action might make known, likewise; of a guide, its factors."""
-    if not isinstance(doing, GroundAction) or not doing.changes:
+def apparent_factors(task: Task, doing: GroundAction | GroundEvent | GroundTemplate) -> tuple[Factor, ...]:
+    """:func:`seen_factors` and all that an action might make known, or set where it is aborted, likewise; of
+    a guide or an event, its factors."""
+    if not isinstance(doing, GroundAction):
         return doing.factors
+    if not doing.changes:
+        return doing.possible_factors
     third = Fraction(1, 3)
     return seen_factors(task, doing) + tuple(
         Factor(tuple(Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from fractions import Fraction
 from itertools import compress, repeat
 from operator import itemgetter
@@ -10,15 +11,17 @@ from operator import itemgetter
 from typing_extensions import assert_never
 
 from bbtc.diagnostics import Report
+from bbtc.durations import Duration
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
-from bbtc.ground.effects import EffectLowering, LoweredEffect
+from bbtc.ground.effects import EffectLowering, LoweredDuration, LoweredEffect, LoweredTimeOut, arrange
+from bbtc.ground.events import clashes
 from bbtc.ground.goal import unreachable
-from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend
-from bbtc.ground.normal import conjuncts, normalise
+from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend, projection
+from bbtc.ground.normal import conjuncts, normalise, timing_terms
 from bbtc.ground.numbers.digits import digits_of, is_digit
 from bbtc.ground.reachability.atoms import Atoms
-from bbtc.ground.reachability.bulk import consumed, instances
+from bbtc.ground.reachability.bulk import Shared, consumed, instances
 from bbtc.ground.reachability.reach import Reach, reach
 from bbtc.ground.reachability.usage import called
 from bbtc.ground.refused import refused
@@ -69,6 +72,7 @@ def _signatures(model: md.Model) -> tuple[gt.Signature, ...]:
     actions = [
         gt.Signature("action", schema.name, tuple(p.name[1:] for p in schema.parameters))
         for schema in model.schemas.values()
+        if schema.exogenous is None
     ]
     predicates = [
         gt.Signature("predicate", predicate.name, tuple(p.name[1:] for p in predicate.parameters))
@@ -100,6 +104,8 @@ class TaskBuilder:
         self._made: set[str] = set()
         self._asked: dict[str, tuple[str, Row]] = {}
         self._rows: dict[str, set[Row]] = {}
+        self._happening: dict[str, list[gt.GroundAction]] = {}
+        """By event, its instances."""
         self._makers = {
             name: _TemplateMaker(self, template) for name, template in self.model.templates.items()
         }
@@ -110,10 +116,13 @@ class TaskBuilder:
         model, report, limits = self.model, self.report, self.limits
         goal = goal_of(model, self.atoms, report, limits)
         actions = self._actions(rows)
+        events = self._events()
         templates = self._all_templates()
         # The last of them, since conditions ask for variables.
         variables = self.atoms.variables(digits_of(model))
         initial = self._initial(variables)
+        for finding in clashes(events, variables, limits):
+            report.add(finding)
         report.raise_errors()
         if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
             report.warning("BBT0413", "the goal already holds at the start", model.goal_span)
@@ -131,6 +140,7 @@ class TaskBuilder:
             metric=model.metric,
             signatures=_signatures(model),
             goal_span=model.goal_span,
+            events=events,
         )
         order = self.atoms.order()
         return task if order == list(range(len(variables))) else reordered(task, order)
@@ -142,6 +152,9 @@ class TaskBuilder:
         names = called(self.model)
         made: dict[str, list[gt.GroundAction]] = {}
         for schema, each in zip(self.model.schemas.values(), rows, strict=True):
+            if schema.exogenous is not None:
+                self._happening[schema.name] = self._instances(schema, each)
+                continue
             made[schema.name] = self._instances(schema, each)
             if schema.name in names:
                 self._rows[schema.name] = {self.universe.row(action.args) for action in made[schema.name]}
@@ -153,7 +166,8 @@ class TaskBuilder:
     def _instances(self, schema: md.Schema, rows: list[Row]) -> list[gt.GroundAction]:
         """The actions of a schema with the given rows, which are used up."""
         conditions = self.lowering.reached(schema.precondition, schema.parameters)
-        effects = self.effects.reached(self.reached.usage.blocks[schema.name], schema.parameters, schema.span)
+        block = self.reached.usage.blocks[schema.name] if schema.during is None else normalise(schema.effect)
+        effects = self.effects.reached(block, schema.parameters, schema.span)
         unit, counts_cost = Fraction(1), self.model.counts_cost
         made: list[gt.GroundAction] = []
         for some in consumed(rows):
@@ -167,6 +181,8 @@ class TaskBuilder:
                 met = [condition is not FALSE for condition in found]
                 chunk, found = list(compress(chunk, met)), list(compress(found, met))
                 done = list(compress(done, met))
+            if schema.during is not None and counts_cost:  # it costs nothing where it does not happen
+                done = [(self._with_cost(*each), Fraction(0)) for each in done]
             made += instances(
                 gt.GroundAction,
                 len(chunk),
@@ -177,8 +193,67 @@ class TaskBuilder:
                 map(itemgetter(1), done) if counts_cost else repeat(unit),
                 repeat(()),
                 repeat(schema.span),
+                *self._interruptions(schema, chunk),
             )
-        return made
+        return self._timed(schema, made)
+
+    def _timed(self, schema: md.Schema, made: list[gt.GroundAction]) -> list[gt.GroundAction]:
+        """The actions of a schema with how long they take, and when they are given up."""
+        if schema.duration is None and schema.timeout is None:
+            return made
+        used = list(timing_terms(schema.duration, schema.timeout))
+        slots, frame = projection(self.universe, schema.parameters, used)
+        takes, most = schema.duration, schema.timeout
+        duration = None if takes is None else LoweredDuration(self.effects, takes, frame)
+        timeout = None if most is None else LoweredTimeOut(self.effects, most, frame)
+
+        def timing(row: Row) -> tuple[Duration | None, Fraction | None]:
+            env = frame.env(row)
+            limit = None if timeout is None else timeout.seconds(env)
+            return None if duration is None else duration.of(env), limit
+
+        rows = [self.universe.row(action.args) for action in made]
+        found = Shared(slots, len(schema.parameters), lambda some: list(map(timing, some))).all(rows)
+        return [
+            replace(action, duration=seconds, timeout=limit)
+            for action, (seconds, limit) in zip(made, found, strict=True)
+        ]
+
+    def _interruptions(
+        self, schema: md.Schema, rows: list[Row]
+    ) -> tuple[Iterable[Condition | None], Iterable[tuple[gt.Factor, ...]]]:
+        """Under which condition each instance goes on, and what happens where it does not."""
+        if schema.during is None:
+            return repeat(None), repeat(())
+        frame = Frame(self.universe, schema.parameters)
+        condition = self.lowering.condition(schema.during, frame)
+        abort = self.effects.effect(normalise(schema.on_abort), frame, schema.span)
+        envs = [frame.env(row) for row in rows]
+        return [condition(env) for env in envs], [self._with_cost(*abort.factors(env)) for env in envs]
+
+    @staticmethod
+    def _with_cost(factors: tuple[gt.Factor, ...], cost: Fraction) -> tuple[gt.Factor, ...]:
+        """What happens, with the cost that is certain among it."""
+        return factors if not cost else arrange([*factors, gt.Factor((gt.Outcome(gt.ONE, (), cost=cost),))])
+
+    # --- events ------------------------------------------------------------------------------
+
+    def _events(self) -> tuple[gt.GroundEvent, ...]:
+        """Every event that can ever happen, by round and name."""
+        rounds = md.rounds_of(self.model)
+        found = [
+            gt.GroundEvent(
+                each.schema,
+                each.args,
+                each.precondition,
+                self._with_cost(each.factors, each.cost if self.model.counts_cost else Fraction(0)),
+                rounds[name],
+                each.span,
+            )
+            for name, instances_ in self._happening.items()
+            for each in instances_
+        ]
+        return tuple(sorted(found, key=lambda event: (event.round, event.name)))
 
     def is_action(self, name: str, row: Row) -> bool:
         """Whether an action with these arguments can ever apply."""
@@ -255,6 +330,9 @@ class _TemplateMaker:
             case md.BodyControl(kind, children):
                 parts = [self._body(child) for child in children]
                 return lambda env: [gt.BodyControl(kind, tuple(each for part in parts for each in part(env)))]
+            case md.BodyRetry(attempts, child):
+                tried = self._body(child)
+                return lambda env: [gt.BodyControl("retry-until-success", tuple(tried(env)), attempts)]
             case md.BodyCondition(formula):
                 condition = self.builder.lowering.condition(formula, self.frame)
                 return lambda env: [gt.BodyCondition(condition(env))]

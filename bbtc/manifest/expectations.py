@@ -10,8 +10,10 @@ from fractions import Fraction
 from types import MappingProxyType
 
 from bbtc.artefacts.cursor import clip, nearest
-from bbtc.artefacts.numbers import exact, parse_written
+from bbtc.artefacts.numbers import exact, parse_probability, parse_written
+from bbtc.durations import LONGEST
 from bbtc.manifest.measured import Measured
+from bbtc.rounding import decimal
 from bbtc.source import Span
 from bbtc.tree.nodes import walk
 
@@ -52,6 +54,9 @@ class Expectation:
     text: str
     span: Span | None = field(default=None, compare=False)
 
+    seconds: Fraction | None = None
+    """Of success by a deadline: how many."""
+
     @property
     def disturbed(self) -> bool:
         """Is it about a world that others change? Then all actions of the task matter."""
@@ -65,12 +70,22 @@ class Expectation:
     def unmet(self, found: Measured) -> str | None:
         """What the figure is instead; None where the expectation is met. Exact; a figure that is
         infinite or undefined meets nothing."""
+        if self.seconds is not None:
+            return self._unmet_in_time(found, self.seconds)
         value = FIGURES[self.figure](found)
         if value is None:
             return f"{self.figure} is infinite or undefined"
         if _OPERATORS[self.comparison](Fraction(value), self.number):
             return None
         return f"{self.figure} is {exact(Fraction(value))}"
+
+    def _unmet_in_time(self, found: Measured, seconds: Fraction) -> str | None:
+        """The same, of success by a deadline, of which bounds are known: what is not certain is not met."""
+        least, most = found.success_by(seconds)
+        if least >= self.number:
+            return None
+        between = f"between {decimal(least, 9)} and {decimal(most, 9)}"
+        return f"success within {decimal(seconds, 12)} s is {between}"
 
 
 def parse_expectation(text: str, span: Span | None = None) -> Expectation:
@@ -83,3 +98,13 @@ def parse_expectation(text: str, span: Span | None = None) -> Expectation:
         advice = nearest(figure, tuple(FIGURES)) or f"there are {', '.join(FIGURES)}"
         raise ValueError(f"unknown figure '{clip(figure)}'; {advice}")
     return Expectation(figure, comparison, parse_written(number), text.strip(), span)
+
+
+def success_in_time(seconds: str, at_least: str, span: Span | None = None) -> Expectation:
+    """Success by a deadline, with a probability of that at least. Raises ``ValueError`` that says what is
+    wrong with the numbers."""
+    time = parse_written(seconds, "a number of seconds such as 120")
+    if not 0 < time <= LONGEST:
+        raise ValueError(f"{clip(seconds)} is not above 0 and at most {LONGEST} seconds")
+    text = f"success_by {seconds} >= {at_least}"
+    return Expectation("success_by", ">=", parse_probability(at_least), text, span, time)

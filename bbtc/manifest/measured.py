@@ -40,6 +40,16 @@ class Measured:
             self._recovery = recovery(tree.task, tree.root, self.limits)
         return self._recovery
 
+    def success_by(self, seconds: Fraction) -> tuple[Fraction, Fraction]:
+        """Bounds of the probability of success within so many seconds. Raises
+        :class:`bbtc.diagnostics.BbtcError` where it is not known how long actions take."""
+        from bbtc.belief.chain import explore
+        from bbtc.timing.figures import success_by
+
+        task = self.tree.task
+        by = success_by(task, explore(task, self.tree.root, self.limits), seconds, self.limits)
+        return by.at_least, by.at_most
+
     @property
     def recovery_worst(self) -> Fraction:
         """What it attains of the best in the state where that is least."""

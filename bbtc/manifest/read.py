@@ -16,7 +16,7 @@ from bbtc.backends.registry import load_exporter, parse_options
 from bbtc.diagnostics import BbtcError, Unreadable
 from bbtc.manifest import modules
 from bbtc.manifest.entries import Export, Manifest, TreeEntry
-from bbtc.manifest.expectations import Expectation, parse_expectation
+from bbtc.manifest.expectations import Expectation, parse_expectation, success_in_time
 from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
 from bbtc.manifest.places import Places
 from bbtc.planner.options import Prefer, Retries
@@ -161,8 +161,13 @@ class _Reader:
         return tuple(self.faults.each(self._few(at.elements(), at), self._expectation))
 
     def _expectation(self, at: At) -> Expectation:
+        span = self.marked.span(at.path)
         try:
-            return parse_expectation(_text(at), self.marked.span(at.path))
+            if isinstance(at.value, dict):
+                outer = self._members(at, ["success_by"], [])
+                by = self._members(outer["success_by"], ["seconds", "at_least"], [])
+                return success_in_time(by["seconds"].string(), by["at_least"].string(), span)
+            return parse_expectation(_text(at), span)
         except ValueError as error:
             raise at.fault("BBT0604", printable(str(error))) from None
 

@@ -13,7 +13,18 @@ from typing import Literal, TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
-from bbtc.model.effect import Choice, Effect, Set, leaves, settings
+from bbtc.model.effect import (
+    NOTHING,
+    Add,
+    Choice,
+    Effect,
+    LiftedDuration,
+    Set,
+    TimeOut,
+    Together,
+    leaves,
+    settings,
+)
 from bbtc.model.formula import And, Atom, Formula, Term
 from bbtc.model.types import Object, Parameter, TypeHierarchy
 from bbtc.source import Span
@@ -79,10 +90,22 @@ class Function:
     range: NumberRange | None = None
 
 
+Rate: TypeAlias = Literal["action", "second"]
+
+
+@dataclass(frozen=True, slots=True)
+class Exogenous:
+    """What makes an event of a schema: how often it is drawn, and the events that happen after it."""
+
+    per: Rate = "action"
+    before: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """An action. ``observe`` is what ``:observe`` shows: a condition, or a noisy draw; where that
-    ``repeats``, it is drawn anew only when a fact that it reads changes."""
+    """An action, or with ``exogenous`` an event, which happens by itself. ``observe`` is what ``:observe``
+    shows: a condition, or a noisy draw; where that ``repeats``, it is drawn anew only when a fact that it
+    reads changes."""
 
     name: str
     parameters: tuple[Parameter, ...]
@@ -93,7 +116,29 @@ class Schema:
     repeats: bool = False
     told: tuple[Reading, ...] = ()
     """What is told besides."""
+    during: Formula | None = None
+    """While this is true the action goes on; else it ends, with the effect ``on_abort``."""
+    on_abort: Effect = NOTHING
+    exogenous: Exogenous | None = None
     span: Span | None = field(default=None, compare=False, repr=False)
+    duration: LiftedDuration | None = None
+    timeout: TimeOut | None = None
+    """Where it is given, ``effect`` is a choice of what happens then and what happens else."""
+
+    @property
+    def kind(self) -> Literal["action", "event"]:
+        """What messages call it."""
+        return "action" if self.exogenous is None else "event"
+
+    @property
+    def effects(self) -> Effect:
+        """All that it may do: its effect, and what happens where it is aborted."""
+        return self.effect if self.on_abort is NOTHING else Together((self.effect, self.on_abort))
+
+    @property
+    def counts(self) -> bool:
+        """Is it an event that adds to cost or reward? Then it matters wherever actions are started."""
+        return self.exogenous is not None and any(isinstance(leaf, Add) for leaf in leaves(self.effect))
 
     @property
     def tells(self) -> bool:
@@ -157,6 +202,15 @@ class BodyControl:
 
 
 @dataclass(frozen=True, slots=True)
+class BodyRetry:
+    """The child again where it fails, ``attempts`` times in all."""
+
+    attempts: int
+    child: Body
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class BodyCondition:
     """A condition of a template body."""
 
@@ -183,7 +237,7 @@ class BodyForeach:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
-Body: TypeAlias = BodyControl | BodyCondition | BodyCall | BodyForeach
+Body: TypeAlias = BodyControl | BodyRetry | BodyCondition | BodyCall | BodyForeach
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +314,7 @@ class Model:
     predicates: Mapping[str, Predicate]
     functions: Mapping[str, Function]
     schemas: Mapping[str, Schema]
+    """Actions, and events behind them."""
     rules: tuple[Rule, ...]
     sensors: tuple[Sensor, ...]
     templates: Mapping[str, Template]
@@ -283,6 +338,11 @@ class Model:
     span: Span | None = field(default=None, compare=False, repr=False)
     problem_span: Span | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def events(self) -> tuple[Schema, ...]:
+        """The schemas that are events."""
+        return tuple(schema for schema in self.schemas.values() if schema.exogenous is not None)
+
 
 def walk(body: Body) -> Iterator[Body]:
     """Every part of a body, parents first, from left to right."""
@@ -291,7 +351,7 @@ def walk(body: Body) -> Iterator[Body]:
         case BodyControl(_, children):
             for child in children:
                 yield from walk(child)
-        case BodyForeach(_, child):
+        case BodyForeach(_, child) | BodyRetry(_, child):
             yield from walk(child)
         case BodyCall() | BodyCondition():
             return
@@ -313,6 +373,25 @@ def set_values(model: Model) -> dict[str, set[Truth]]:
     """The values that actions may give the atoms of each predicate that any sets."""
     found: dict[str, set[Truth]] = {}
     for schema in model.schemas.values():
-        for each in settings(schema.effect, possible=True):
+        for each in settings(schema.effects, possible=True):
             found.setdefault(each.predicate, set()).add(each.value)
     return found
+
+
+def rounds_of(model: Model) -> dict[str, int]:
+    """By event, the number of its round: that after the last round of those which are before it, or 0."""
+    orders = {
+        name: schema.exogenous.before
+        for name, schema in model.schemas.items()
+        if schema.exogenous is not None
+    }
+    before: dict[str, list[str]] = {name: [] for name in orders}
+    for name, later in orders.items():
+        for each in later:
+            before[each].append(name)
+    rounds: dict[str, int] = {}
+    while len(rounds) < len(orders):  # no event is before itself: that was checked with the names
+        for name, earlier in before.items():
+            if name not in rounds and all(each in rounds for each in earlier):
+                rounds[name] = max((rounds[each] + 1 for each in earlier), default=0)
+    return rounds

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
+from bbtc.durations import Duration, Empirical, Fixed, LogNormal, Triangular, Uniform
 from bbtc.kleene import Truth
 from bbtc.model.amount import Amount, Arithmetic, Constant, FunctionValue
 from bbtc.model.amount import substitute as substitute_amount
@@ -72,6 +73,47 @@ class Choice:
 
     branches: tuple[Branch, ...]
     oneof: bool = False
+    span: Span | None = field(default=None, compare=False, repr=False)
+    timeout: TimeOut | None = None
+    """If given, the first of two branches is what happens where an action is given up, and the probabilities
+    follow from this; those of the branches stand for any."""
+
+
+@dataclass(frozen=True, slots=True)
+class LiftedDuration:
+    """How long an action takes: a number of seconds, or a distribution of them (:mod:`bbtc.durations`)."""
+
+    kind: Literal["number", "uniform", "triangular", "empirical", "lognormal"]
+    amounts: tuple[Amount, ...]
+    weights: tuple[Fraction, ...] = ()
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+def duration_of(lifted: LiftedDuration, values: Sequence[Fraction]) -> Duration:
+    """The duration with these values of its amounts; they need not make sense."""
+    match lifted.kind:
+        case "number":
+            return Fixed(values[0])
+        case "uniform":
+            return Uniform(values[0], values[1])
+        case "triangular":
+            return Triangular(values[0], values[1], values[2])
+        case "lognormal":
+            return LogNormal(values[0], values[1])
+        case "empirical":
+            return Empirical(tuple(zip(values, lifted.weights, strict=True)))
+        case _:
+            assert_never(lifted.kind)
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOut:
+    """An action is given up after so many seconds; how probably it comes to that is given, or follows from
+    its duration."""
+
+    seconds: Amount
+    duration: LiftedDuration | None
+    probability: Fraction | None
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
@@ -202,8 +244,22 @@ def substitute(effect: Effect, binding: dict[str, Term]) -> Effect:
             return When(substitute_formula(condition, binding), substitute(inner, binding), span)
         case ForEach(parameters, inner, span):
             return ForEach(parameters, substitute(inner, binding), span)
-        case Choice(branches, oneof, span):
+        case Choice(branches):
             drawn = tuple(Branch(b.probability, substitute(b.effect, binding), b.span) for b in branches)
-            return Choice(drawn, oneof, span)
+            return replace(effect, branches=drawn, timeout=_substitute_timeout(effect.timeout, binding))
         case _:
             assert_never(effect)
+
+
+def substitute_duration(duration: LiftedDuration | None, binding: dict[str, Term]) -> LiftedDuration | None:
+    """The duration with free parameters replaced."""
+    if duration is None:
+        return None
+    return replace(duration, amounts=tuple(substitute_amount(each, binding) for each in duration.amounts))
+
+
+def _substitute_timeout(timeout: TimeOut | None, binding: dict[str, Term]) -> TimeOut | None:
+    if timeout is None:
+        return None
+    seconds = substitute_amount(timeout.seconds, binding)
+    return replace(timeout, seconds=seconds, duration=substitute_duration(timeout.duration, binding))

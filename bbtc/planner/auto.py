@@ -273,9 +273,8 @@ class _Auto:
         with suppress(LimitReached):
             wider = also_at(task, starts)
             self.add_for_own_starts(plan_policy(wider, self.target, few, _silent, self.inner, whole=True))
-        if task.numbers:
-            return
-        if any(plan.tree.success_probability == 1 and plan.chain is not None for plan in self.plans):
+        surely = any(plan.tree.success_probability == 1 and plan.chain is not None for plan in self.plans)
+        if surely and not task.events and not task.numbers:
             self.surely_from(starts)
 
     def learns(self, most: int, *, everywhere: bool = False) -> bool:
@@ -366,7 +365,7 @@ class _Auto:
 
     def surely(self) -> Plan | None:
         """A policy over partial states, unless there is none that surely reaches the goal."""
-        if self.upper < 1:
+        if self.upper < 1 or self.task.events:
             return None
         # Where it finds none, it looks for the best policy there is: both share nearly all the time.
         limits = self.limits.part(_SURE_SHARE if self.met else _NEARLY_ALL)

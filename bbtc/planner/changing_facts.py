@@ -183,8 +183,8 @@ def _values(task: Task) -> list[tuple[Truth, ...]]:
     for initial in task.initial:
         for own, value in zip(found, initial.values, strict=True):
             own.add(value)
-    for action in task.actions:
-        for effect in effects_of(apparent_factors(task, action)):
+    for each in task.occurrences:
+        for effect in effects_of(apparent_factors(task, each)):
             for variable, value in effect.sets:
                 found[variable].add(value)
     return [

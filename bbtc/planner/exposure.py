@@ -59,6 +59,7 @@ def _changes_of_success(
     space, packing = found.space, found.space.packing
     numbers = {row.tobytes(): number for number, row in enumerate(space.states)}
     changes = np.zeros(len(values))
+    visited = visited[~space.passing[visited]]
     before = packing.values(space.states[visited])
     for count, state in enumerate(visited.tolist()):
         if count % _LOOK == 0:

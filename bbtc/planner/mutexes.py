@@ -11,12 +11,14 @@ changed by others, each by itself.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import combinations
 
 from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import LimitReached
-from bbtc.ground.task import Task
+from bbtc.ground.condition import TRUE
+from bbtc.ground.task import Effect, Factor, GroundAction, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import ALWAYS, cubes, set_bits
@@ -69,6 +71,7 @@ class _Way:
 def exclusive_groups(task: Task, limits: Limits) -> list[Group]:
     """The groups, in order. None where an action has too many outcomes to look at. Raises
     :class:`bbtc.diagnostics.LimitReached` when the time is over."""
+    task = _one_after_another(task)
     try:
         model = Determinised(task, limits)
     except LimitReached:
@@ -92,6 +95,45 @@ def exclusive_groups(task: Task, limits: Limits) -> list[Group]:
             begins = all(any(values[v] == Truth.TRUE for v in numbers) for values in starts)
             groups.append(Group(numbers, begins and all(_keeps_one(way, members) for way in ways)))
     return sorted(groups, key=lambda group: group.members)
+
+
+def _one_after_another(task: Task) -> Task:
+    """The task with events as actions. Those of a round all read the state before it: as if each could happen
+    anywhere, with any of its effects, and so could an action that goes on while they do, or its abort."""
+    if not task.events:
+        return task
+    free = GroundAction("", (), TRUE, ())
+    actions: list[GroundAction] = []
+    for action in task.actions:
+        if action.during is None:
+            actions.append(action)
+        else:
+            ends = (action.factors, action.on_abort)
+            actions += [replace(free, factors=tuple(map(_anywhere, each))) for each in ends]
+    actions += [replace(free, factors=tuple(map(_anywhere, event.factors))) for event in task.events]
+    return replace(task, actions=tuple(actions), events=())
+
+
+def _anywhere(factor: Factor) -> Factor:
+    """A factor whose effects may happen, or not, whatever their guards read."""
+    return Factor(
+        tuple(
+            Outcome(
+                outcome.probability,
+                tuple(effect for effect in outcome.effects if effect.when is None),
+                (
+                    *map(_anywhere, outcome.factors),
+                    *(_perhaps(effect) for effect in outcome.effects if effect.when is not None),
+                ),
+            )
+            for outcome in factor.outcomes
+        )
+    )
+
+
+def _perhaps(effect: Effect) -> Factor:
+    half = Fraction(1, 2)
+    return Factor((Outcome(half, (Effect(None, effect.sets),)), Outcome(half, ())))
 
 
 def _ways(action: Action, count: int) -> Iterator[_Way]:

@@ -42,6 +42,7 @@ from bbtc.limits import Limits
 from bbtc.planner.changing_facts import ChangingFacts
 from bbtc.planner.elsewhere import MOST_VISITED, changed, spread
 from bbtc.planner.exposure import least_exposed
+from bbtc.planner.mdp.contraction import contracted
 from bbtc.planner.mdp.explore import Explorer
 from bbtc.planner.mdp.graph import Floats, draw_probabilities, sums
 from bbtc.planner.mdp.maxprob import Bounds, MaxProb, max_prob
@@ -117,7 +118,9 @@ def _wide_space(
         # What the others may become was found to be known before.
         fresh = range(looked_at, explorer.count) if few else spread(range(explorer.count), MOST_VISITED)
         looked_at = explorer.count
-        states = map(bytes, space.packing.unpack(space.states[np.array(fresh, dtype=np.int64)]).tolist())
+        rows = np.array(fresh, dtype=np.int64)
+        rows = rows[~space.passing[rows]]
+        states = map(bytes, space.packing.unpack(space.states[rows]).tolist())
         explorer.also_start(changed(facts, states, limits))
         if explorer.count == looked_at:
             all_of_them = few
@@ -132,6 +135,7 @@ def _wide_space(
         if not few:
             space = explorer.space(np.zeros(explorer.count, dtype=np.bool_), None)
             break
+    space = contracted(space, limits)
     goal = holds(space.packing, bit_test(space.packing, task.goal), space.states)
     kept = ~goal[space.choice_state]
     edges = kept[space.edge_choice]

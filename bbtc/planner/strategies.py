@@ -28,14 +28,15 @@ class Strategy(Protocol):
 @dataclass(frozen=True, slots=True)
 class Entry:
     """Module and function of a strategy, imported when used, and which options it knows: ``max_actions`` is
-    refused where it does not; ``retries`` changes nothing there. ``hidden``: does it plan with hidden
-    facts? ``numbers``: with numbers?"""
+    refused where it does not; ``retries`` changes nothing there. ``hidden``, ``events``, ``numbers``: does it
+    plan with hidden facts, with what happens by itself, with numbers?"""
 
     module: str
     function: str
     max_actions: bool = False
     retries: bool = False
     hidden: bool = True
+    events: bool = True
     numbers: bool = True
 
     def load(self) -> Strategy:
@@ -49,7 +50,11 @@ STRATEGIES = {
     "search": Entry("bbtc.planner.chaining.search", "plan_search", retries=True, numbers=False),
     "policy": Entry("bbtc.planner.synthesis.policy", "plan_policy", max_actions=True, retries=True),
     "strong-cyclic": Entry(
-        "bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic", hidden=False, numbers=False
+        "bbtc.planner.strong_cyclic.plan",
+        "plan_strong_cyclic",
+        hidden=False,
+        events=False,
+        numbers=False,
     ),
     "auto": Entry("bbtc.planner.auto", "plan_auto", max_actions=True, retries=True),
     "advised": Entry("bbtc.planner.auto", "plan_advised", max_actions=True, retries=True),
@@ -87,6 +92,12 @@ def run_strategy(
             "BBT0505",
             f"the strategy '{name}' does not plan with hidden facts",
             hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.hidden)}",
+        )
+    if task.events and not STRATEGIES[name].events:
+        raise BbtcError.single(
+            "BBT0505",
+            f"the strategy '{name}' does not plan with events",
+            hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.events)}",
         )
     if task.numbers and not STRATEGIES[name].numbers:
         raise BbtcError.single(

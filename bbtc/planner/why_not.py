@@ -21,7 +21,7 @@ from bbtc.diagnostics import LimitReached
 from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, conjuncts
 from bbtc.ground.describe import describe
 from bbtc.ground.repair import Every, Need, Repairs, Root, Some, Way, every, some
-from bbtc.ground.task import Effect, GroundAction, Task, apparent_factors, effects_of
+from bbtc.ground.task import Effect, GroundAction, GroundEvent, Task, apparent_factors, effects_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.h_add import Facts, Relaxation, possible
@@ -122,11 +122,12 @@ class RootFinder:
         self._task = task
         self._limits = limits
         self._relaxed = Relaxation(task, limits)
-        self._makers: dict[_Fact, list[tuple[GroundAction, Effect]]] = {}
-        for action in task.actions:
-            for effect in effects_of(apparent_factors(task, action)):
+        self._makers: dict[_Fact, list[tuple[GroundAction | GroundEvent, Effect]]] = {}
+        for each in task.occurrences:
+            for effect in effects_of(apparent_factors(task, each)):
                 for fact in effect.sets:
-                    self._makers.setdefault(fact, []).append((action, effect))
+                    self._makers.setdefault(fact, []).append((each, effect))
+        self._spans = {each.name: each.span for each in task.occurrences}
 
     def lost(self, values: Values) -> list[Condition]:
         """The parts of the goal that nothing can make true from a state."""
@@ -165,13 +166,12 @@ class RootFinder:
 
     def _block(self, root: Root[_Fact], values: Values) -> Block:
         variable, value = root.what
-        needing = None if root.by is None else self._task.action_by_name[root.by]
         return Block(
             describe(self._task, Is(variable, Truth.TRUE)),
             value,
             Truth(values[variable]),
             root.by,
-            self._task.goal_span if needing is None else needing.span,
+            self._task.goal_span if root.by is None else self._spans[root.by],
             root.setters,
         )
 

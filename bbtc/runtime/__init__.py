@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
+from bbtc.runtime.moving import MovingWorld, Test
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -28,7 +29,15 @@ from bbtc.runtime.nodes import (
     skipper,
     until_success,
 )
-from bbtc.runtime.numbers import NumberBeliefs, NumberWorld, Shift, Values, between, on_numbers
+from bbtc.runtime.numbers import (
+    MovingNumberWorld,
+    NumberBeliefs,
+    NumberWorld,
+    Shift,
+    Values,
+    between,
+    on_numbers,
+)
 from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
 __all__ = [
@@ -41,6 +50,8 @@ __all__ = [
     "Latch",
     "Monitor",
     "Move",
+    "MovingNumberWorld",
+    "MovingWorld",
     "NumberBeliefs",
     "NumberWorld",
     "Outcome",
@@ -52,6 +63,7 @@ __all__ = [
     "StopOutside",
     "StopWhenBlocked",
     "Telling",
+    "Test",
     "Try",
     "UntilSuccess",
     "Values",

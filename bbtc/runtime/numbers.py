@@ -3,6 +3,7 @@ a robot's beliefs keep them."""
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +11,7 @@ from py_trees.blackboard import Blackboard
 from py_trees.common import Status
 
 from bbtc.runtime.beliefs import Beliefs
+from bbtc.runtime.moving import MovingWorld
 from bbtc.runtime.nodes import Fact, in_words
 from bbtc.runtime.world import Factor, Outcome, State, When, World, happen
 
@@ -64,6 +66,27 @@ def on_numbers(factors: list[Factor], before: Values) -> list[Factor]:
     ]
 
 
+def number_changes(rng: random.Random, factors: list[Factor], before: State) -> Values:
+    """What an action or an event changes, numbers included."""
+    changes: Values = happen(rng, on_numbers(factors, before), before)
+    return changes
+
+
+def said(value: Any) -> str:
+    """A value in words."""
+    if value is None:
+        return "unknown"
+    return str(value).lower()
+
+
+def in_short(changes: Values, before: State) -> str:
+    """What differs from the state before, in words."""
+    kept: Values = before
+    return ", ".join(
+        f"{in_words(fact)} {said(value)}" for fact, value in changes.items() if value != kept[fact]
+    )
+
+
 class NumberWorld(World):
     """A world with numbers among its facts."""
 
@@ -73,18 +96,49 @@ class NumberWorld(World):
         return value
 
     def _act(self, *action: str) -> Status:
-        changes: Values = happen(self._rng, on_numbers(self._actions[action], self._state), self._state)
+        changes = number_changes(self._rng, self._actions[action], self._state)
+        told = in_short(changes, self._state)
         self._state.update(changes)
-        told = ", ".join(f"{in_words(fact)} {said(value)}" for fact, value in changes.items())
         self._report(f"{in_words(action)}: {told or 'no change'}")
         return Status.SUCCESS
 
 
-def said(value: Any) -> str:
-    """A value in words."""
-    if value is None:
-        return "unknown"
-    return str(value).lower()
+class MovingNumberWorld(MovingWorld):
+    """A world with numbers among its facts, and with events."""
+
+    def _number(self, *fact: str) -> int:
+        state: Values = self._state
+        value: int = state[fact]
+        return value
+
+    def _act(self, *action: str) -> Status:
+        if action not in self._interrupted:
+            self._change(action, self._actions[action], "no change")
+            self._happen()
+            return Status.SUCCESS
+        self._happen()
+        goes_on, abort = self._interrupted[action]
+        if goes_on(self._state) is True:
+            self._change(action, self._actions[action], "no change")
+        else:
+            self._change(action, abort, "aborted")
+        return Status.SUCCESS
+
+    def _change(self, action: Fact, factors: list[Factor], otherwise: str) -> None:
+        changes = number_changes(self._rng, factors, self._state)
+        told = in_short(changes, self._state)
+        self._state.update(changes)
+        self._report(f"{in_words(action)}: {told or otherwise}")
+
+    def _happen(self) -> None:
+        for events in self._events:
+            due = [factors for test, factors in events if test(self._state) is True]
+            factors = [factor for each in due for factor in each]
+            changes = number_changes(self._rng, factors, self._state)
+            told = in_short(changes, self._state)
+            self._state.update(changes)
+            if told:
+                self._report(f"by itself: {told}")
 
 
 class NumberBeliefs(Beliefs):

@@ -10,8 +10,31 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from bbtc.kleene import Truth
 from bbtc.source import SourceFile, Span
+from bbtc.syntax.formulas import And as And
+from bbtc.syntax.formulas import Assign as Assign
+from bbtc.syntax.formulas import Believed as Believed
+from bbtc.syntax.formulas import Body as Body
+from bbtc.syntax.formulas import BodyCall as BodyCall
+from bbtc.syntax.formulas import BodyCondition as BodyCondition
+from bbtc.syntax.formulas import BodyControl as BodyControl
+from bbtc.syntax.formulas import BodyForeach as BodyForeach
+from bbtc.syntax.formulas import BodyRetry as BodyRetry
+from bbtc.syntax.formulas import Branch as Branch
+from bbtc.syntax.formulas import Effect as Effect
+from bbtc.syntax.formulas import EffectAnd as EffectAnd
+from bbtc.syntax.formulas import EffectForall as EffectForall
+from bbtc.syntax.formulas import FluentEffect as FluentEffect
+from bbtc.syntax.formulas import Formula as Formula
+from bbtc.syntax.formulas import Imply as Imply
+from bbtc.syntax.formulas import Not as Not
+from bbtc.syntax.formulas import OneOf as OneOf
+from bbtc.syntax.formulas import Or as Or
+from bbtc.syntax.formulas import Probabilistic as Probabilistic
+from bbtc.syntax.formulas import Quantified as Quantified
+from bbtc.syntax.formulas import Test as Test
+from bbtc.syntax.formulas import Unsupported as Unsupported
+from bbtc.syntax.formulas import When as When
 from bbtc.syntax.terms import Arithmetic as Arithmetic
 from bbtc.syntax.terms import Atom as Atom
 from bbtc.syntax.terms import Comparison as Comparison
@@ -27,204 +50,6 @@ from bbtc.syntax.terms import TypedGroup as TypedGroup
 from bbtc.syntax.terms import TypedList as TypedList
 from bbtc.syntax.terms import Variable as Variable
 from bbtc.syntax.terms import span_field
-
-# --- formulas --------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Not:
-    """``(not f)``."""
-
-    part: Formula
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class And:
-    """``(and f…)``."""
-
-    parts: tuple[Formula, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Or:
-    """``(or f…)``."""
-
-    parts: tuple[Formula, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Imply:
-    """``(imply a b)``."""
-
-    premise: Formula
-    conclusion: Formula
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Quantified:
-    """``(exists (params) f)`` and ``(forall (params) f)``."""
-
-    kind: Literal["exists", "forall"]
-    parameters: TypedList
-    part: Formula
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Believed:
-    """``(believed f q)``: how probable a formula is, given what was told, is at least a number."""
-
-    part: Formula
-    at_least: Number
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Test:
-    """``(unknown p)`` and ``(known p)``: two-valued tests of an atom, or of what is believed."""
-
-    kind: Literal["unknown", "known"]
-    atom: Atom | Believed
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Unsupported:
-    """A construct that is recognised and refused by name (preference, object fluent, …)."""
-
-    construct: str
-    text: str
-    span: Span = span_field()
-
-
-Formula: TypeAlias = (
-    Atom | Empty | Equality | Comparison | Not | And | Or | Imply | Quantified | Believed | Test | Unsupported
-)
-
-
-# --- effects ---------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Assign:
-    """``p`` (true), ``(not p)`` (false) or ``(unknown p)`` as an effect or an initial fact."""
-
-    atom: Atom
-    value: Truth
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class EffectAnd:
-    """``(and e…)``."""
-
-    parts: tuple[Effect, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class When:
-    """``(when condition effect)``."""
-
-    condition: Formula
-    effect: Effect
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class EffectForall:
-    """``(forall (params) effect)``."""
-
-    parameters: TypedList
-    effect: Effect
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Branch:
-    """``p effect`` within ``probabilistic``."""
-
-    probability: Number
-    effect: Effect
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class Probabilistic:
-    """``(probabilistic p1 e1 …)``."""
-
-    branches: tuple[Branch, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class OneOf:
-    """``(oneof e…)``."""
-
-    parts: tuple[Effect, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class FluentEffect:
-    """``(increase (total-cost) n)`` and its kin: increase, decrease, assign, scale-up, scale-down."""
-
-    operator: str
-    fluent: FluentRef
-    amount: NumericExpression
-    span: Span = span_field()
-
-
-Effect: TypeAlias = (
-    Empty | Assign | EffectAnd | When | EffectForall | Probabilistic | OneOf | FluentEffect | Unsupported
-)
-
-
-# --- template bodies -------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class BodyControl:
-    """``(sequence …)``, ``(fallback …)``, ``(skipper …)``."""
-
-    kind: Literal["sequence", "fallback", "skipper"]
-    children: tuple[Body, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class BodyCondition:
-    """``(condition formula)``."""
-
-    formula: Formula
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class BodyCall:
-    """``(action name term…)``, or ``(name term…)`` for an action or a template (``kind`` None)."""
-
-    kind: Literal["action"] | None
-    name: Name
-    args: tuple[Term, ...]
-    span: Span = span_field()
-
-
-@dataclass(frozen=True, slots=True)
-class BodyForeach:
-    """``(foreach (params) child)``: the child once for every binding, as children of the parent."""
-
-    parameters: TypedList
-    child: Body
-    span: Span = span_field()
-
-
-Body: TypeAlias = BodyControl | BodyCondition | BodyCall | BodyForeach
-
 
 # --- sections --------------------------------------------------------------------------------
 
@@ -289,7 +114,7 @@ class Functions:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """``(:action name :parameters … :precondition … :observe … :repeats :effect …)``."""
+    """``(:action name :parameters … :precondition … :observe … :repeats :effect … :while … :on-abort …)``."""
 
     name: Name
     parameters: TypedList
@@ -298,6 +123,45 @@ class Action:
     effect: Effect | None
     span: Span = span_field()
     repeats: bool = False
+    during: Formula | None = None
+    on_abort: Effect | None = None
+
+    timing: Timing | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Exogenous:
+    """``(:exogenous name :parameters … :precondition … :per action :before (other…) :effect …)``."""
+
+    name: Name
+    parameters: TypedList
+    precondition: Formula | None
+    effect: Effect
+    per: Name | None
+    before: tuple[Name, ...] | None
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """What ``:duration`` gives: a number of seconds, or a distribution of them with its parameters; of
+    ``empirical``, the values and their ``weights``."""
+
+    kind: Literal["number", "uniform", "triangular", "empirical", "lognormal"]
+    amounts: tuple[NumericExpression, ...]
+    weights: tuple[Number, ...]
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """``:duration``, ``:timeout``, ``:timeout-probability``, ``:on-timeout`` of an action, where given."""
+
+    duration: Duration | None
+    timeout: NumericExpression | None
+    timeout_probability: Number | None
+    on_timeout: Effect | None
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -546,6 +410,7 @@ Section: TypeAlias = (
     | Predicates
     | Functions
     | Action
+    | Exogenous
     | Derived
     | Sensor
     | StateVariable

@@ -6,18 +6,38 @@ rules are what their methods return, and ``item*`` is a list. A test holds the t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import Generic, Literal, NamedTuple, TypeAlias, TypeVar
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Literal, NamedTuple, TypeAlias
 
 from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax import ast, leaves
 from bbtc.syntax.engine import Token
 from bbtc.syntax.expressions import Expressions, Operand, keyword, numeric, parameters_of, unsupported
+from bbtc.syntax.fields import (
+    Before,
+    Body,
+    Condition,
+    Distribution,
+    Duration,
+    During,
+    Effect,
+    Field,
+    Fields,
+    Implied,
+    Observe,
+    OnAbort,
+    OnTimeout,
+    Parameters,
+    Per,
+    Repeats,
+    Sensed,
+    Timeout,
+    TimeoutProbability,
+)
 from bbtc.syntax.leaves import Misuse
 
-_V_co = TypeVar("_V_co", covariant=True)
 _Predicate: TypeAlias = ast.PredicateDeclaration
 _Function: TypeAlias = ast.FunctionDeclaration
 InitElements: TypeAlias = list[ast.InitElement | list[ast.InitElement]]
@@ -28,6 +48,14 @@ _GOALS: Mapping[str, Literal["goal-probability", "goal-reward"]]
 _GOALS = {"GOAL_PROBABILITY": "goal-probability", "GOAL_REWARD": "goal-reward"}
 _CONTROLS: Mapping[str, Literal["sequence", "fallback", "skipper"]]
 _CONTROLS = {"SEQUENCE": "sequence", "FALLBACK": "fallback", "SKIPPER": "skipper"}
+
+
+_DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[str, ...]]] = {
+    "uniform": ("uniform", ("least", "greatest")),
+    "triangular": ("triangular", ("least", "likeliest", "greatest")),
+    "lognormal": ("lognormal", ("median", "sigma")),
+}
+"""Distributions of durations, and what numbers they take."""
 
 
 class Types(NamedTuple):
@@ -50,81 +78,6 @@ class DerivedHead(NamedTuple):
     name: Token
     parameters: ast.TypedList
     close: Token
-
-
-# --- fields ----------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Field(Generic[_V_co]):
-    """One field of an action, a template, a sensor or an axiom: ``keyword value``."""
-
-    keyword: Token
-    value: _V_co
-
-
-class Parameters(Field[ast.TypedList]):
-    """``:parameters``, ``:vars``."""
-
-
-class Condition(Field[ast.Formula]):
-    """``:precondition``, ``:condition`` of a sensor, ``:context``."""
-
-
-class Effect(Field[ast.Effect]):
-    """``:effect``."""
-
-
-class Observe(Field[ast.Observation | ast.SensingModel]):
-    """``:observe``, ``:sensing-model``."""
-
-
-class Distribution(Field[ast.Effect]):
-    """``:distribution``."""
-
-
-class Repeats(Field[bool]):
-    """``:repeats``."""
-
-
-class Body(Field[ast.Body]):
-    """``:body`` of a template."""
-
-
-class Sensed(Field[ast.Observation]):
-    """``:sensed``."""
-
-
-class Implied(Field[ast.Formula]):
-    """``:implies``."""
-
-
-class _Fields:
-    """The fields of a form, by kind. Raises :class:`Misuse` if one is given twice."""
-
-    def __init__(self, fields: Iterable[Field[object]]) -> None:
-        self._found: dict[type, Field[object]] = {}
-        for field in fields:
-            before = self._found.setdefault(type(field), field)
-            if before is not field:
-                message = f"`{field.keyword.text.lower()}` is given twice"
-                raise Misuse("BBT0110", message, field.keyword.span, None, before.keyword.span)
-
-    def get(self, kind: type[Field[_V_co]]) -> _V_co | None:
-        """The value of a kind of field, if it is given."""
-        field = self._found.get(kind)
-        return field.value if isinstance(field, kind) else None
-
-    def need(self, kind: type[Field[_V_co]], keyword: str, what: str, name: Token) -> _V_co:
-        """The value of a kind of field. Raises :class:`Misuse` if it is not given."""
-        value = self.get(kind)
-        if value is None:
-            raise Misuse("BBT0111", f"{what} lacks `{keyword}`", name.span)
-        return value
-
-    def parameters(self, close: Token) -> ast.TypedList:
-        """The parameters of a form that ends with a token."""
-        return parameters_of(self.get(Parameters) or (), close)
 
 
 class Builder(Expressions):
@@ -240,7 +193,7 @@ class Builder(Expressions):
     # --- actions and the like ----------------------------------------------------------------
 
     def action(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Action:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.Action(
             leaves.name(name),
             fields.parameters(close),
@@ -249,10 +202,25 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            fields.get(During),
+            fields.get(OnAbort),
+            _timing(fields, head.to(close)),
+        )
+
+    def exogenous(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Exogenous:
+        fields = Fields(given)
+        return ast.Exogenous(
+            leaves.name(name),
+            fields.parameters(close),
+            fields.get(Condition),
+            fields.need(Effect, ":effect", "the event", name),
+            fields.get(Per),
+            fields.get(Before),
+            head.to(close),
         )
 
     def template(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Template:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.Template(
             leaves.declared("template", leaves.name(name)),
             fields.parameters(close),
@@ -263,7 +231,7 @@ class Builder(Expressions):
         )
 
     def sensor(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Sensor:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.Sensor(
             leaves.name(name),
             fields.parameters(close),
@@ -274,7 +242,7 @@ class Builder(Expressions):
         )
 
     def axiom(self, head: Token, given: list[Field[object]], close: Token) -> ast.Derived:
-        fields = _Fields(given)
+        fields = Fields(given)
         implied = fields.need(Implied, ":implies", "the axiom", head)
         parts = implied.parts if isinstance(implied, ast.And) else (implied,)
         heads = [part for part in parts if isinstance(part, ast.Atom)]
@@ -299,9 +267,52 @@ class Builder(Expressions):
     effect = Effect
     template_body = Body
     axiom_head = Implied
+    on_timeout = OnTimeout
+    during = During
+    on_abort = OnAbort
+
+    def per(self, keyword: Token, name: Token) -> Per:
+        return Per(keyword, leaves.name(name))
+
+    def before(self, keyword: Token, names: Token) -> Before:
+        return Before(keyword, tuple(leaves.names(names)))
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
+
+    def duration(self, keyword: Token, operand: Operand) -> Duration:
+        expression = _seconds(keyword, operand)
+        return Duration(keyword, ast.Duration("number", (expression,), (), expression.span))
+
+    def duration_drawn(self, field: Token, head: Token, operands: list[Operand], close: Token) -> Duration:
+        word = keyword(head)
+        kind, wanted = _DRAWN[word]
+        if len(operands) != len(wanted):
+            message = f"`{word}` takes {len(wanted)} numbers: `({word} {' '.join(wanted)})`"
+            raise Misuse("BBT0443", message, head.to(close))
+        amounts = tuple(_seconds(head, operand) for operand in operands)
+        return Duration(field, ast.Duration(kind, amounts, (), head.to(close)))
+
+    def duration_empirical(
+        self,
+        keyword: Token,
+        head: Token,
+        points: list[tuple[ast.NumericExpression, ast.Number]],
+        close: Token,
+    ) -> Duration:
+        amounts, weights = tuple(each for each, _ in points), tuple(weight for _, weight in points)
+        return Duration(keyword, ast.Duration("empirical", amounts, weights, head.to(close)))
+
+    def duration_point(
+        self, head: Token, operand: Operand, number: Token, _: Token
+    ) -> tuple[ast.NumericExpression, ast.Number]:
+        return _seconds(head, operand), self.number(number)
+
+    def timeout(self, keyword: Token, operand: Operand) -> Timeout:
+        return Timeout(keyword, _seconds(keyword, operand))
+
+    def timeout_probability(self, keyword: Token, number: Token) -> TimeoutProbability:
+        return TimeoutProbability(keyword, self.number(number))
 
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
         return Observe(keyword, _observed(formulas))
@@ -369,7 +380,7 @@ class Builder(Expressions):
     def observation(
         self, head: Token, name: Token, given: list[Field[object]], close: Token
     ) -> ast.ObservationModel:
-        fields = _Fields(given)
+        fields = Fields(given)
         return ast.ObservationModel(
             leaves.name(name),
             fields.parameters(close),
@@ -462,6 +473,9 @@ class Builder(Expressions):
     def body_control(self, head: Token, children: list[ast.Body], close: Token) -> ast.BodyControl:
         return ast.BodyControl(_CONTROLS[head.kind], tuple(children), head.to(close))
 
+    def body_retry(self, head: Token, number: Token, child: ast.Body, close: Token) -> ast.BodyRetry:
+        return ast.BodyRetry(self.number(number), child, head.to(close))
+
     def body_condition(self, head: Token, formula: ast.Formula, close: Token) -> ast.BodyCondition:
         return ast.BodyCondition(formula, head.to(close))
 
@@ -481,6 +495,26 @@ class Builder(Expressions):
 
     def unsupported_section(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
         return unsupported(keyword(head), head, close)
+
+
+def _timing(fields: Fields, span: Span) -> ast.Timing | None:
+    duration, timeout = fields.get(Duration), fields.get(Timeout)
+    chance, effect = fields.get(TimeoutProbability), fields.get(OnTimeout)
+    given = any(each is not None for each in (duration, timeout, chance, effect))
+    return ast.Timing(duration, timeout, chance, effect, span) if given else None
+
+
+def _seconds(head: Token, operand: Operand) -> ast.NumericExpression:
+    """A number of seconds."""
+    expression = numeric(operand)
+    if expression is None:
+        span = operand.span if isinstance(operand, ast.Unsupported) else head.span
+        message, hint = (
+            "this is no number of seconds",
+            "a number, or a function that `:init` gives: `(time ?a ?b)`",
+        )
+        raise Misuse("BBT0101", message, span, hint)
+    return expression
 
 
 def _observed(formulas: list[ast.Formula]) -> ast.Observation:

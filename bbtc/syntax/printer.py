@@ -15,7 +15,7 @@ from bbtc.syntax.layout import Doc, Setter, has_empty_lines
 from bbtc.syntax.scan import without_comments
 
 _TOKEN = re.compile(r"[()]|[^\s()]+")
-_Schema: TypeAlias = ast.Action | ast.Template | ast.Sensor | ast.ObservationModel
+_Schema: TypeAlias = ast.Action | ast.Exogenous | ast.Template | ast.Sensor | ast.ObservationModel
 
 
 def print_document(document: ast.Document) -> str:
@@ -37,7 +37,8 @@ class _Docs:
 
     def _word(self, word: str, after: int, span: Span) -> Span | None:
         """Where a keyword stands that the tree does not keep: the first one after an offset."""
-        match = re.compile(re.escape(word), re.IGNORECASE).search(self._text, after, span.end)
+        whole = r"(?![\w-])" if word.startswith(":") else ""
+        match = re.compile(re.escape(word) + whole, re.IGNORECASE).search(self._text, after, span.end)
         return Span(span.source, match.start(), match.end()) if match else None
 
     def _parentheses(self, after: int, last: int, span: Span) -> Span | None:
@@ -74,7 +75,7 @@ class _Docs:
                 return self.listed("(:predicates", map(self.predicate, node.declarations), node, apart=True)
             case ast.Functions():
                 return self.listed("(:functions", map(self.function, node.declarations), node)
-            case ast.Action() | ast.Template() | ast.Sensor() | ast.ObservationModel():
+            case ast.Action() | ast.Exogenous() | ast.Template() | ast.Sensor() | ast.ObservationModel():
                 return self.schema(node)
             case ast.Derived():
                 return self.derived(node)
@@ -132,7 +133,15 @@ class _Docs:
                     doc = self.observed(value.content)
                 case ast.SensingModel():
                     doc = self.effect(value.effect)
-                case _ if word in {":effect", ":distribution"}:
+                case ast.Duration():
+                    doc = self.duration(value)
+                case _ if word in {":timeout", ":timeout-probability"}:
+                    doc = self.expression(value)
+                case ast.Name():
+                    doc = _leaf(value)
+                case tuple():
+                    doc = self._names(value)
+                case _ if word in {":effect", ":distribution", ":on-abort", ":on-timeout"}:
                     doc = self.effect(value)
                 case _ if word == ":body":
                     doc = self.body(value)
@@ -143,6 +152,25 @@ class _Docs:
         return Doc(
             head, (_leaf(node.name), *_in_source_order(fields)), ")", span, 1, broken=True, spaced=True
         )
+
+    def duration(self, node: ast.Duration) -> Doc:
+        """``12``, ``(uniform 8 20)``, ``(empirical (8 0.5) (20 0.5))``."""
+        amounts = tuple(map(self.expression, node.amounts))
+        if node.kind == "number":
+            return amounts[0]
+        if node.kind == "empirical":
+            amounts = tuple(
+                Doc("(", (amount, _number(weight)), ")", amount.span, glued=1, filled=True)
+                for amount, weight in zip(amounts, node.weights, strict=True)
+            )
+        return Doc(f"({node.kind}", amounts, ")", node.span, filled=True)
+
+    def _names(self, names: tuple[ast.Name, ...]) -> Doc:
+        """Names of events: one alone, or several in parentheses."""
+        if len(names) == 1:
+            return _leaf(names[0])
+        span = Span(names[0].span.source, names[0].span.start, names[-1].span.end)
+        return Doc("(", tuple(map(_leaf, names)), ")", span, glued=1)
 
     def _spelt(self, words: Sequence[str], after: int, span: Span) -> str:
         """Of words that mean the same, the one that stands in a form; the first where none does."""
@@ -417,6 +445,9 @@ class _Docs:
         match node:
             case ast.BodyControl():
                 return Doc(f"({node.kind}", tuple(map(self.body, node.children)), ")", node.span)
+            case ast.BodyRetry():
+                parts = (_number(node.attempts), self.body(node.child))
+                return Doc("(retry", parts, ")", node.span, glued=1)
             case ast.BodyCondition():
                 return Doc("(condition", (self.formula(node.formula),), ")", node.span, glued=1)
             case ast.BodyCall():
@@ -470,7 +501,29 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
             tells = f":{node.observe.word}" if isinstance(node.observe, ast.SensingModel) else ":observe"
             observed = (tells, node.observe)
             repeats = (":repeats", node.repeats)
-            return [(":precondition", node.precondition), observed, repeats, (":effect", node.effect)]
+            timing = node.timing
+            timed = (
+                []
+                if timing is None
+                else [
+                    (":duration", timing.duration),
+                    (":timeout", timing.timeout),
+                    (":timeout-probability", timing.timeout_probability),
+                    (":on-timeout", timing.on_timeout),
+                ]
+            )
+            during = [(":while", node.during), (":on-abort", node.on_abort)]
+            return [
+                (":precondition", node.precondition),
+                observed,
+                repeats,
+                (":effect", node.effect),
+                *during,
+                *timed,
+            ]
+        case ast.Exogenous():
+            when = [(":precondition", node.precondition), (":per", node.per), (":before", node.before)]
+            return [*when, (":effect", node.effect)]
         case ast.Template():
             return [(":precondition", node.precondition), (":effect", node.effect), (":body", node.body)]
         case ast.ObservationModel():

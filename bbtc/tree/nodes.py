@@ -92,11 +92,21 @@ PlanStatus: TypeAlias = Literal["target-reached", "out-of-reach", "stuck", "limi
 
 
 @dataclass(frozen=True, slots=True)
+class SuccessBy:
+    """Bounds of the probability that a tree succeeds within so many seconds."""
+
+    seconds: Fraction
+    at_least: Fraction
+    at_most: Fraction
+
+
+@dataclass(frozen=True, slots=True)
 class Tree:
     """A tree with the task its conditions and actions refer to, and the planner's claim.
 
     ``success_probability`` is exact; ``target`` is the probability that was asked for. ``bounds``,
-    where known, hold the best probability that any policy could reach. With a ``monitor``, the task tells
+    where known, hold the best probability that any policy could reach. With ``success_by``, the target is one
+    of success by a deadline. With a ``monitor``, the task tells
     what is true, and the monitor what is known of it.
     """
 
@@ -107,6 +117,7 @@ class Tree:
     status: PlanStatus
     bounds: tuple[Fraction, Fraction] | None = None
     monitor: Monitor | None = None
+    success_by: SuccessBy | None = None
 
     def _repr_svg_(self) -> str | None:
         """The tree as a picture, for notebooks."""

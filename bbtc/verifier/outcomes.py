@@ -4,6 +4,9 @@ An action of few outcomes is one command that has a branch for each combination 
 can do. Of more, it is a series of stages: each draws one factor and notes in *pending* cells what is
 to be set, and the last sets it. So the size of the program is that of the action, not of the product
 of its factors, and no condition is read after an effect.
+
+Events are drawn in stages of their own, one after the other: what they set in one round is noted, too, and
+applies at its end.
 """
 
 from __future__ import annotations
@@ -14,7 +17,17 @@ from fractions import Fraction
 from typing import TypeAlias
 
 from bbtc.ground.condition import variables
-from bbtc.ground.task import Charge, Effect, Factor, GroundAction, Task, charges_of, effects_of
+from bbtc.ground.task import (
+    Charge,
+    Effect,
+    Factor,
+    GroundAction,
+    GroundEvent,
+    Task,
+    charges_of,
+    effects_of,
+    outcomes_of,
+)
 from bbtc.verifier.conditions import FALSE, TRUE, UNKNOWN, where_true
 from bbtc.verifier.program import (
     NO,
@@ -30,6 +43,7 @@ from bbtc.verifier.program import (
     Update,
     all_of,
     any_of,
+    none_of,
     put,
 )
 
@@ -42,18 +56,26 @@ Drawn: TypeAlias = tuple[Fraction, tuple[Effect, ...], tuple[Charge, ...], Fract
 
 
 def relevant(task: Task, actions: Iterable[GroundAction], read: Iterable[int]) -> list[int]:
-    """The variables on which those ``read`` depend, by way of the conditions of effects, in order, and those
-    on which costs and rewards do. The others can change, but change nothing that matters."""
+    """The variables on which those ``read`` depend, by way of the conditions of effects and events, in order,
+    and those on which costs and rewards do. The others can change, but change nothing that matters."""
     actions = list(actions)
-    effects = [effect for action in actions for effect in effects_of(action.factors)]
-    charges = (charge for action in actions for charge in charges_of(action.factors))
-    needed = {*read, *(variable for charge in charges for variable in variables(charge.when))}
+    factors = [factor for action in actions for factor in action.possible_factors]
+    effects: list[tuple[Effect, tuple[int, ...]]] = [(effect, ()) for effect in effects_of(factors)]
+    needed = {*read, *(variable for charge in charges_of(factors) for variable in variables(charge.when))}
+    for action in actions if task.events else ():
+        needed.update(() if action.during is None else variables(action.during))
+    for event in task.events:
+        happens = tuple(variables(event.precondition))
+        effects += [(effect, happens) for effect in effects_of(event.factors)]
+        if _charges(event):
+            needed.update(happens)
+            needed.update(v for charge in charges_of(event.factors) for v in variables(charge.when))
     while True:
         more = {
             variable
-            for effect in effects
-            if effect.when is not None and any(changed in needed for changed, _ in effect.sets)
-            for variable in variables(effect.when)
+            for effect, happens in effects
+            if any(changed in needed for changed, _ in effect.sets)
+            for variable in (*happens, *(() if effect.when is None else variables(effect.when)))
         }
         if more <= needed:
             return [index for index in range(len(task.variables)) if index in needed]
@@ -71,29 +93,98 @@ class Outcomes:
     commands: list[Command] = field(default_factory=list)
     stage: int | None = None
     _stages: int = 1  # 0: no action is under way; 1: the outcome is drawn, and applies now
+    _events: int = 0  # the first stage of what happens after an action
     _pending: dict[int, int] = field(default_factory=dict)
     _entry: dict[str, int] = field(default_factory=dict)
 
-    def prepare(self, actions: Sequence[GroundAction]) -> None:
-        """Write the stages of those actions that need them."""
-        staged = [action for action in actions if combinations(action.factors) > self.most_branches]
-        if not staged:
+    def prepare(self, actions: Sequence[GroundAction], events: Sequence[Sequence[GroundEvent]] = ()) -> None:
+        """Write the stages of those actions that need them, and of ``events``, round by round."""
+        rounds = [[event for event in each if self._matters(event)] for each in events]
+        interrupted = [action for action in actions if action.during is not None and any(rounds)]
+        staged = [
+            action
+            for action in actions
+            if action in interrupted or combinations(action.factors) > self.most_branches
+        ]
+        if not staged and not any(rounds):
             return
         self.stage = self.draft.cell(Cell("control", "stage", "stage of the outcome being drawn; 0: none", 0))
-        touched = {v for action in staged for effect in effects_of(action.factors) for v, _ in effect.sets}
+        drawn = [factor for action in staged for factor in action.possible_factors]
+        drawn += [factor for each in rounds for event in each for factor in event.factors]
+        touched = {v for effect in effects_of(drawn) for v, _ in effect.sets}
         for variable in sorted(touched & self.cell_of.keys()):
             of = self.draft.cells[self.cell_of[variable]]
             self._pending[variable] = self.draft.cell(
                 Cell("pending", of.subject, "what it becomes: 0 as it is, 1 false, 2 unknown, 3 true", 3)
             )
+        self._events = self._happen(rounds, 0)
         for action in staged:
-            self._entry[action.name] = self._series(action.factors, 1)
+            if action in interrupted:
+                self._entry[action.name] = self._happen(rounds, self._going_on(action))
+            else:
+                self._entry[action.name] = self._series(action.factors, 1)
         highest = self._stages
         self.draft.cells[self.stage] = Cell("control", "stage", self.draft.cells[self.stage].meaning, highest)
+        self._apply(1, self._events, "the outcome applies")
+
+    def _apply(self, stage: int, after: int, remark: str) -> None:
+        """What is noted is set in one stage, then comes another."""
+        assert self.stage is not None
         apply = [applied(self.cell_of[v], p) for v, p in self._pending.items()]
         clear = [put(pending, 0) for pending in self._pending.values()]
-        after = Branch(_ONE, (*apply, *clear, put(self.stage, 0)), (_ZERO, _ZERO, _ZERO))
-        self.commands.append(Command(None, Compare(self.stage, "=", 1), (after,), "the outcome applies"))
+        branch = Branch(_ONE, (*apply, *clear, put(self.stage, after)), (_ZERO, _ZERO, _ZERO))
+        self.commands.append(Command(None, Compare(self.stage, "=", stage), (branch,), remark))
+
+    def _new_stage(self) -> int:
+        self._stages += 1
+        return self._stages
+
+    # --- events -------------------------------------------------------------------------------
+
+    def _matters(self, event: GroundEvent) -> bool:
+        """Does it set what has a cell, or add to costs or rewards?"""
+        sets = (variable for effect in effects_of(event.factors) for variable, _ in effect.sets)
+        return _charges(event) or any(variable in self.cell_of for variable in sets)
+
+    def _happen(self, rounds: Sequence[Sequence[GroundEvent]], after: int) -> int:
+        """Write the stages that draw the events, then go to the stage ``after``; the first one."""
+        assert self.stage is not None
+        for events in reversed(rounds):
+            if not events:
+                continue
+            applies = self._new_stage()
+            self._apply(applies, after, "what has happened applies")
+            after = applies
+            for event in reversed(events):
+                happens = self._series(event.factors, after)
+                guard = where_true(event.precondition, self.cell_of)
+                if guard == YES:
+                    after = happens
+                    continue
+                own = self._new_stage()
+                for holds, then in ((guard, happens), (none_of(guard), after)):
+                    if holds != NO:
+                        branch = Branch(_ONE, (put(self.stage, then),), (_ZERO, _ZERO, _ZERO))
+                        here = all_of(Compare(self.stage, "=", own), holds)
+                        self.commands.append(Command(None, here, (branch,), f"does {event.name} happen?"))
+                after = own
+        return after
+
+    def _going_on(self, action: GroundAction) -> int:
+        """Write the stages in which an action goes on or is aborted; the first one."""
+        assert self.stage is not None
+        assert action.during is not None
+        applies = self._new_stage()
+        self._apply(applies, 0, f"{action.name} has ended")
+        ends, aborted = self._series(action.factors, applies), self._series(action.on_abort, applies)
+        own = self._new_stage()
+        guard = where_true(action.during, self.cell_of)
+        for holds, then in ((guard, ends), (none_of(guard), aborted)):
+            branch = Branch(_ONE, (put(self.stage, then),), (_ZERO, _ZERO, _ZERO))
+            here = all_of(Compare(self.stage, "=", own), holds)
+            if holds != NO:
+                self.commands.append(Command(None, here, (branch,), f"does {action.name} go on?"))
+        return own
 
     @property
     def idle(self) -> Expression:
@@ -106,6 +197,9 @@ class Outcomes:
             assert self.stage is not None
             rewards = (_ONE, action.cost, _ZERO)
             return (Branch(_ONE, (*updates, put(self.stage, self._entry[action.name])), rewards),)
+        if self._events:
+            assert self.stage is not None
+            updates = (*updates, put(self.stage, self._events))
         merged: dict[tuple[tuple[Update, ...], _Amounts, tuple[Charged, ...]], Fraction] = {}
         for probability, effects, charges, cost, reward in draws(action.factors):
             if probability:
@@ -147,12 +241,16 @@ class Outcomes:
                 amounts = (_ZERO, outcome.cost, outcome.reward)
                 charges = charged(outcome.charges, self.cell_of)
                 branches.append(Branch(outcome.probability, updates, amounts, charges))
-        self._stages += 1
-        own = self._stages
+        own = self._new_stage()
         self.commands.append(
             Command(None, Compare(self.stage, "=", own), tuple(branches), "a factor is drawn")
         )
         return own
+
+
+def _charges(event: GroundEvent) -> bool:
+    """Does an event ever add to cost or reward?"""
+    return any(outcome.cost or outcome.reward or outcome.charges for outcome in outcomes_of(event.factors))
 
 
 def noted(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.task import Task
@@ -19,6 +19,9 @@ from bbtc.verifier.prism import counted
 from bbtc.verifier.program import REWARDS, Program
 from bbtc.verifier.solve import Recomputed, recompute
 from bbtc.verifier.worlds import space_of
+
+if TYPE_CHECKING:
+    from bbtc.verifier.timed import TimeFound
 
 Engine: TypeAlias = Literal["auto", "own", "storm", "all"]
 
@@ -55,6 +58,7 @@ class Verdict:
     problems: tuple[Diagnostic, ...]
     hidden: bool = False
     worlds: Recomputed | None = None
+    time: TimeFound | None = None
 
     def raise_problems(self) -> None:
         """Raise :class:`BbtcError` unless the tree is what it claims to be."""
@@ -72,14 +76,38 @@ def verify(tree: Tree, limits: Limits, engine: Engine = "auto", hidden: Task | N
     if tree.task.components:
         raise ValueError("the task hides facts: give one that it stands for, and this one as `hidden`")
     own = found = worlds = None
+    time: TimeFound | None = None
     if engine != "storm":
         own = recompute(explore(solvable_chain(tree.task, tree.root), limits), limits)
+        time = _time(tree, limits)
         space = None if hidden is None else space_of(hidden, tree.root, limits)
         worlds = None if space is None else recompute(space, limits)
     if engine in {"storm", "all"} or (engine == "auto" and storm.is_installed()):
         found = _ask_storm(chain_of(tree.task, tree.root), limits)
     looked = _Looked(own, found, hidden is not None, worlds)
-    return Verdict(tree, own, found, tuple(_problems(tree, looked)), looked.hidden, worlds)
+    problems = (*_problems(tree, looked), *_late(tree, time))
+    return Verdict(tree, own, found, problems, looked.hidden, worlds, time)
+
+
+def _time(tree: Tree, limits: Limits) -> TimeFound | None:
+    """The time that the tree takes; None where no action says how long it takes."""
+    if all(action.duration is None for action in tree.task.actions):
+        return None
+    from bbtc.verifier.timed import time_found
+
+    seconds = None if tree.success_by is None else tree.success_by.seconds
+    return time_found(tree.task, tree.root, limits, seconds)
+
+
+def _late(tree: Tree, time: TimeFound | None) -> Iterator[Diagnostic]:
+    """What the tree claims of a deadline, where that cannot be."""
+    by, found = tree.success_by, None if time is None else time.by
+    if by is None or found is None:
+        return
+    if by.at_least > Fraction(found[1]) + TOLERANCE or by.at_most < Fraction(found[0]) - TOLERANCE:
+        claimed = f"from {decimal(by.at_least, 9)} to {decimal(by.at_most, 9)}"
+        message = f"the tree claims success within {decimal(by.seconds, 12)} s {claimed}"
+        yield _disagreement(f"{message}; it is from {found[0]:.9g} to {found[1]:.9g}")
 
 
 def _ask_storm(program: Program, limits: Limits) -> StormFigures:
@@ -147,13 +175,14 @@ def _agree(answer: storm.Answer, value: Fraction | None) -> bool:
 
 def _contradictions(tree: Tree) -> Iterator[Diagnostic]:
     """What the tree says about itself that cannot all be true."""
-    claimed = tree.success_probability
+    claimed = tree.success_probability if tree.success_by is None else tree.success_by.at_least
     contradicted = tree.status == ("out-of-reach" if claimed >= tree.target else "target-reached")
     if contradicted:
         yield _disagreement(
             f"the status is '{tree.status}', but the target is {_shown(tree.target)} and the claim "
             f"{_shown(claimed)}"
         )
+    claimed = tree.success_probability
     if tree.bounds is not None and claimed > tree.bounds[1]:
         yield _disagreement(
             f"the tree claims {_shown(claimed)}, more than the {_shown(tree.bounds[1])} that it says any "

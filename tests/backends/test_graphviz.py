@@ -27,6 +27,7 @@ from bbtc.ground.condition import Is
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, walk
 from tests.conftest import Golden
+from tests.long_form import amount
 from tests.profiles import examples
 from tests.strategies import HOSTILE_NAMES, soda_tree, trees
 
@@ -379,13 +380,16 @@ def test_a_small_subtree_stands_in_the_middle_of_the_room_its_neighbours_leave()
     assert alone.x[5] == pytest.approx(alone.x[0])
 
 
+DEEP = amount(1_500, 3_000)
+
+
 def test_a_very_deep_tree_is_drawn() -> None:
     tree = soda_tree()
     node: ControlNode | ConditionNode = ConditionNode("leaf", tree.task.goal)
-    for level in range(3000):
+    for level in range(DEEP):
         node = ControlNode(f"c{level}", "sequence", (node,))
     text = str(export(replace(tree, root=node), "svg", {"layout": "bbtc"}))
-    assert len(re.findall("data-id=", text)) == 3001
+    assert len(re.findall("data-id=", text)) == DEEP + 1
 
 
 def test_the_text_does_not_depend_on_the_hash_seed() -> None:

@@ -17,7 +17,7 @@ import pytest
 
 from bbtc.builder.runner import build
 from tests.builder.projects import REPOSITORY, bbtc, several
-from tests.long_form import amount
+from tests.long_form import LONG, amount
 
 TREES = 10
 KILLS = amount(5, 100)
@@ -56,6 +56,7 @@ def test_a_killed_build_leaves_whole_files_only(tmp_path: Path, jobs: str) -> No
     assert bbtc(folder, "build", "-j", jobs).returncode == 0
     whole = time.monotonic() - start
     rng = random.Random(f"kill {jobs}")
+    next_jobs = jobs if LONG else "1"
     hits = 0
     for number in range(1, (KILLS + 1) // 2 + 1):
         write_sources(folder, chances[number % 2])
@@ -75,9 +76,9 @@ def test_a_killed_build_leaves_whole_files_only(tmp_path: Path, jobs: str) -> No
         for name, content in artefacts(folder).items():
             assert content in (expected[0][name], expected[1][name]), f"{name} is broken"
         if rng.random() < 0.5:  # else the next one starts from what this one left
-            assert bbtc(folder, "build", "-j", jobs).returncode == 0
+            assert bbtc(folder, "build", "-j", next_jobs).returncode == 0
             assert artefacts(folder) == expected[number % 2]
             assert list((folder / ".bbtc/scratch").iterdir()) == []
-    assert bbtc(folder, "build", "-j", jobs).returncode == 0
+    assert bbtc(folder, "build", "-j", next_jobs).returncode == 0
     assert artefacts(folder) == expected[number % 2]
     assert hits, "no build was killed while it ran"

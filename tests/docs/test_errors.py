@@ -15,10 +15,11 @@ import pytest
 from bbtc import pipeline
 from bbtc.codes import CODES
 from bbtc.diagnostics import BbtcError, Diagnostic, Report
-from bbtc.limits import Limits
+from bbtc.limits import MOST_NODES, Limits
 from bbtc.source import SourceFile
 from bbtc.syntax.parser import parse
 from tests.cli.program import bbtc
+from tests.long_form import amount
 
 REPOSITORY = Path(__file__).parents[2]
 PAGES = REPOSITORY / "docs" / "errors"
@@ -50,6 +51,10 @@ TITLES = {code: each.title for code, each in CODES.items()}
 WITH_EXAMPLES = [code for code in CODES if (PAGES / f"{code}.md").exists() and examples(code)]
 
 
+LIMITS = Limits(diagram_nodes=amount(20_000, MOST_NODES))
+"""Fewer nodes are sooner too many."""
+
+
 def diagnostics(text: str) -> list[Diagnostic]:
     """All that ``check`` and ``compile`` tell about a text."""
     report = Report()
@@ -59,9 +64,9 @@ def diagnostics(text: str) -> list[Diagnostic]:
         inputs = pipeline.select([document], report)
         assert inputs is not None
         model = pipeline.resolve_model(inputs, report, checks=False)
-        pipeline.check_documents([document], report)
+        pipeline.check_documents([document], report, limits=LIMITS)
         if inputs.problem is not None:
-            pipeline.ground_model(model, report, Limits())
+            pipeline.ground_model(model, report, LIMITS)
     except BbtcError as error:
         for diagnostic in error.diagnostics:
             report.add(diagnostic)

@@ -19,8 +19,12 @@ import pytest
 from tests.cli.forked import commands
 
 REPOSITORY = Path(__file__).parents[2]
-PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+PAGES = [
+    page
+    for page in (REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md")))
+    if BLOCK.search(page.read_text())
+]
 
 
 def sessions(page: Path) -> list[tuple[str, str]]:

@@ -85,6 +85,9 @@ class Lifted:
     external: set[str] = field(default_factory=set)
     functions: set[str] = field(default_factory=set)
     actions: list[dict[str, Form]] = field(default_factory=list)
+    events: list[dict[str, Form]] = field(default_factory=list)
+    watched: set[Fact] = field(default_factory=set)
+    """Facts that events must never set to different values at once."""
     rules: list[tuple[Form, dict[str, set[str]], Form]] = field(default_factory=list)
     init: list[Form] = field(default_factory=list)
     goal: Form = ""
@@ -110,6 +113,8 @@ class Lifted:
                     self.functions.update(function[0] for function in rest)
                 case ":action":
                     self.actions.append({":name": rest[0], **_fields(rest[1:])})
+                case ":exogenous":
+                    self.events.append({":name": rest[0], **_fields(rest[1:])})
                 case ":derived":
                     name, *parameters = rest[0]
                     self.rules.append(([name, *typed(parameters)], typed(parameters), rest[1]))
@@ -312,7 +317,11 @@ class Lifted:
         """Every action with arguments, by its name."""
         return {
             f"{action[':name']}({','.join(bound.values())})": Move(
-                action.get(":precondition", []), action.get(":effect", []), bound
+                ["and", action.get(":precondition", []), action.get(":while", [])],
+                action.get(":effect", []),
+                bound,
+                action.get(":while"),
+                action.get(":on-abort", []),
             )
             for action in self.actions
             for bound in self.bindings(typed(action.get(":parameters", [])), {})
@@ -329,7 +338,62 @@ class Lifted:
             cost = sum((p * c for p, _, c in draws), Fraction(0)) if self.counts else Fraction(1)
             facts = dict(state)
             move.results[state] = cost, _states((p, {**facts, **change}) for p, change, _ in draws)
+            if self.events:
+                move.results[state] = self.with_events(move, state, move.results[state])
         return move.results[state]
+
+    def with_events(self, move: Move, state: State, alone: Result) -> Result:
+        """What an action costs on average and leads to, with what happens by itself."""
+        if move.during is None:
+            cost, states = alone
+            found = self.happening(states)
+            return cost + found[0] * self.counts, found[1]
+        cost, states = self.happening({state: Fraction(1)})
+        total = cost * self.counts + (0 if self.counts else 1)
+        after: dict[State, Fraction] = {}
+        for each, p in states.items():
+            world = self.world(each)
+            going_on = self.value(move.during, move.bound, world) == 2
+            effect = move.effect if going_on else move.abort
+            for q, change, more in self.effect(effect, move.bound, world):
+                total += p * q * more * self.counts
+                for follower, r in _states([(Fraction(1), {**dict(each), **change})]).items():
+                    after[follower] = after.get(follower, Fraction(0)) + p * q * r
+        return total, after
+
+    def happening(self, states: dict[State, Fraction]) -> Result:
+        """What events cost on average, and what they make of some states."""
+        total = Fraction(0)
+        for events in self.rounds:
+            after: dict[State, Fraction] = {}
+            for state, p in states.items():
+                world, facts = self.world(state), dict(state)
+                due = [
+                    self.effect(event[":effect"], bound, world)
+                    for event in events
+                    for bound in self.bindings(typed(event.get(":parameters", [])), {})
+                    if self.value(event.get(":precondition", []), bound, world) == 2
+                ]
+                for number, one in enumerate(due):
+                    for other in due[:number]:
+                        clash = _contradicting(one, other) & self.watched
+                        assert not clash, f"events contradict each other: {clash}"
+                for q, change, cost in _together(due):
+                    total += p * q * cost
+                    for follower, r in _states([(Fraction(1), {**facts, **change})]).items():
+                        after[follower] = after.get(follower, Fraction(0)) + p * q * r
+            states = after
+        return total, states
+
+    @cached_property
+    def rounds(self) -> list[list[dict[str, Form]]]:
+        """The events that happen at once, those first that others wait for."""
+        left, found = list(self.events), []
+        while left:
+            later = {name for event in left for name in _listed(event.get(":before", []))}
+            found.append([event for event in left if event[":name"] not in later])
+            left = [event for event in left if event[":name"] in later]
+        return found
 
     def world(self, state: State) -> World:
         """:meth:`derived`, remembered."""
@@ -369,6 +433,8 @@ class Move:
     needs: Form
     effect: Form
     bound: Binding
+    during: Form | None = None
+    abort: Form = ""
     draws: dict[tuple[bool, ...], Draws] = field(default_factory=dict)
     results: dict[State, Result] = field(default_factory=dict)
 
@@ -462,6 +528,20 @@ def _together(parts: Iterable[Draws]) -> Draws:
         ]
         result = joined if len(joined) == 1 else _merged(joined)
     return result
+
+
+def _contradicting(one: Draws, other: Draws) -> set[Fact]:
+    """The facts that two draws may set to different values."""
+    return {
+        fact
+        for (_, first, _), (_, second, _) in product(one, other)
+        for fact, value in first.items()
+        if second.get(fact, value) != value
+    }
+
+
+def _listed(names: Form) -> list[str]:
+    return [names] if isinstance(names, str) else list(names)
 
 
 def _merged(draws: Iterable[tuple[Fraction, Change, Fraction]]) -> Draws:

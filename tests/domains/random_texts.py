@@ -38,6 +38,7 @@ class _Writer:
         }
         self.unary = unary
         self.callable: dict[str, list[str]] = {}
+        self.scopes: dict[str, Scope] = {}
         self.declared = {**self.fluents, **self.static, **self.derived}
         self.cost = random.choice(["total-cost", "fuel", ""])
 
@@ -129,6 +130,7 @@ class _Writer:
 
     def action(self, name: str) -> str:
         listed, scope = self.parameters("?x ?y", 2)
+        self.scopes[name] = scope
         self.callable[name] = list(scope.values())
         atom, other = self.atom(scope, self.fluents), self.atom(scope, {**self.static, **self.derived})
         plain = self.among(
@@ -286,7 +288,41 @@ class _Writer:
         ]
         return f"({' '.join([name, *map(self.random.choice, found)])})" if all(found) else "(p)"
 
-    def text(self) -> str:
+    def event(self, number: int, before: list[str]) -> str:
+        """An event, most of the time before all of some others."""
+        listed, scope = self.parameters("?x ?y", 1)
+        needs = self.among(self.condition(scope, 1, self.declared), self.atom(scope, self.fluents))
+        happens = self.effect(scope, 1, priced=self.random.random() < 0.3)
+        fields = [
+            f":parameters ({listed})",
+            f":precondition {self.among(needs, needs, '()')}",
+            f":effect {self.among(happens, f'(probabilistic 0.3 {happens})')}",
+            self.among("", ":per action"),
+        ]
+        if before and self.random.random() < 0.8:
+            fields.append(f":before {before[0] if len(before) == 1 else '(' + ' '.join(before) + ')'}")
+        self.random.shuffle(fields)
+        return f"(:exogenous event-{number} {' '.join(fields)})"
+
+    def events(self, actions: list[str]) -> list[str]:
+        """The actions, of which some go on only while something is true, and some events."""
+        found = []
+        for text, scope in zip(actions, self.scopes.values(), strict=True):
+            if self.random.random() < 0.6:
+                found.append(text)
+                continue
+            more = f" :while {self.condition(scope, 1, self.declared)}"
+            if self.random.random() < 0.5:
+                more += f" :on-abort {self.effect(scope, 1)}"
+            found.append(f"{text[:-1]}{more})")
+        names: list[str] = []
+        for number in range(self.random.randint(1, 3)):
+            found.append(self.event(number, names))
+            names.append(f"event-{number}")
+        self.random.shuffle(found)
+        return found
+
+    def text(self, *, events: bool = False) -> str:
         def listed(names: list[str]) -> str:
             return " ".join(f"{name} - {self.objects[name]}" for name in names)
 
@@ -318,6 +354,9 @@ class _Writer:
             *actions,
             *templates,
         ]
+        if events:  # last of all, so that all else is as without them
+            changed = self.events(actions)
+            sections = [each for each in sections if each not in actions and each not in templates] + changed
         metric = f"(:metric minimize ({self.cost}))" if self.cost else ""
         rest = [name for name in every if name not in self.constants]
         return "\n".join(
@@ -332,6 +371,7 @@ class _Writer:
         )
 
 
-def random_text(seed: int) -> str:
-    """A domain and a problem; the same for the same seed."""
-    return _Writer(seed).text()
+def random_text(seed: int, *, events: bool = False) -> str:
+    """A domain and a problem; the same for the same seed. With ``events``, things happen by themselves, and
+    actions may go on while something is true only; there are no templates then."""
+    return _Writer(seed).text(events=events)

@@ -76,7 +76,7 @@ def _compare_tree(text: str, lifted: Lifted, task: Task, strategy: str, best: fl
     return "tree"
 
 
-@pytest.mark.parametrize("group", range(amount(10, 400)))
+@pytest.mark.parametrize("group", range(amount(7, 400)))
 def test_random_texts_have_the_values_that_their_words_give_them(group: int) -> None:
     """Best probability, within budgets too, least cost, and the runs of a tree; the goal is refused only
     where it is hopeless."""

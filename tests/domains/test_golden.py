@@ -44,8 +44,8 @@ def digests(share: str) -> str:
 
 
 def _share(share: str) -> list[Problem]:
-    quick = [problem for problem in PROBLEMS if str(problem) not in LARGE]
-    return PROBLEMS if LONG else quick[SEEDS.index(share) :: len(SEEDS)]
+    quick = {problem.domain: problem for problem in PROBLEMS if str(problem) not in LARGE}
+    return PROBLEMS if LONG else [*quick.values()][SEEDS.index(share) :: len(SEEDS)]
 
 
 SEEDS = ["1", "4242"]

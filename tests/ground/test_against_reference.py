@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bbtc.diagnostics import BbtcError, Report
-from bbtc.ground import relevance
 from bbtc.ground.condition import evaluate
 from bbtc.ground.instantiate import ground, instantiate
-from bbtc.ground.prune import prune
+from bbtc.ground.pruning import relevance
+from bbtc.ground.pruning.prune import prune
 from bbtc.ground.reachability import bulk, program
 from bbtc.ground.task import Factor, GroundAction, Task
 from bbtc.kleene import Truth

@@ -351,7 +351,7 @@ def test_memory_is_bounded() -> None:
 
 def test_time_is_bounded() -> None:
     with pytest.raises(LimitReached, match="time limit"):
-        task_of(_wide(12, 1000).replace("{goal}", "(p)"), Limits(seconds=0.5))
+        task_of(_wide(12, 1000).replace("{goal}", "(p)"), Limits(seconds=0.2))
 
 
 # --- names -----------------------------------------------------------------------------------

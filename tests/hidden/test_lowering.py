@@ -53,7 +53,7 @@ def _figures(task: Task) -> tuple[Fraction, Fraction, Fraction | None]:
 
 
 @given(texts())
-@examples(amount(30, 600))
+@examples(amount(21, 600))
 def test_the_task_without_components_is_worth_as_much(text: str) -> None:
     try:
         HiddenText.of(text).mdp(150)

@@ -57,7 +57,7 @@ def value(text: str) -> Fraction:
 def test_random_tasks_are_worth_what_their_words_say() -> None:
     """P* and the least number of actions, over all beliefs of the text and all of the domain's words. In
     states that look alike the same may be done, or reading the text would fail."""
-    many = amount(40, 4_000)
+    many = amount(30, 4_000)
     done: Counter[str] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])
@@ -85,7 +85,7 @@ def test_random_tasks_are_worth_what_their_words_say() -> None:
 
 def test_random_tasks_with_noise_are_worth_what_their_words_say() -> None:
     """Within three actions."""
-    many = amount(40, 1_500)
+    many = amount(30, 1_500)
     done: Counter[bool] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])
@@ -110,7 +110,7 @@ def test_random_tasks_with_noise_are_worth_what_their_words_say() -> None:
 def test_storm_finds_the_same_in_the_text(tmp_path: Path) -> None:
     """Exactly, where it looks at every belief."""
     pytest.importorskip("stormpy", reason="Storm is not installed: pip install 'bbtc[storm]'")
-    many = amount(20, 1_000)
+    many = amount(14, 1_000)
     done: Counter[str] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])

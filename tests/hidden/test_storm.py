@@ -28,7 +28,7 @@ _ASKED = ['P=? [F "success"]', 'P=? [F "failure"]', 'R{"actions"}=? [F "finished
 
 def test_the_text_of_a_tree_is_worth_what_the_worlds_say() -> None:
     """The text holds tables in place of worlds: Storm knows of neither."""
-    many = amount(60, 1_500)
+    many = amount(42, 1_500)
     done: Counter[bool] = Counter()
 
     @settings(examples(many), phases=[Phase.generate])

@@ -4,6 +4,7 @@ read, or it is refused by its name and line."""
 from __future__ import annotations
 
 import random
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -29,7 +30,7 @@ from tests.imports.samples import (
     refusal,
     text_of,
 )
-from tests.long_form import amount
+from tests.long_form import LONG, amount
 
 TREE = idioms_tree()
 FILES = {nodes: exported(TREE, nodes) for nodes in PROFILES}
@@ -46,6 +47,16 @@ def test_the_sample_has_every_node_that_is_read() -> None:
 def places(nodes: str) -> range:
     """The numbers of the elements of the sample."""
     return range(len(elements(parsed(FILES[nodes]))))
+
+
+def in_files(names: Sequence[str], always: Collection[str] = ()) -> list[tuple[str, str]]:
+    """Each name with both samples; in the short form with one or the other, unless it is among ``always``."""
+    return [
+        (nodes, name)
+        for at, name in enumerate(names)
+        for number, nodes in enumerate(PROFILES)
+        if LONG or name in always or number == at % len(PROFILES)
+    ]
 
 
 # --- attributes ------------------------------------------------------------------------------
@@ -67,8 +78,7 @@ ATTRIBUTES = sorted(
 )
 
 
-@pytest.mark.parametrize("attribute", [*ATTRIBUTES, "ID"])
-@pytest.mark.parametrize("nodes", PROFILES)
+@pytest.mark.parametrize(("nodes", "attribute"), in_files([*ATTRIBUTES, "ID"]))
 def test_an_attribute_is_refused_by_its_name_and_line(nodes: str, attribute: str) -> None:
     # In all places at once, which is quick; where one is not named then, with those of its tag, and alone.
     tags = [element.tag for element in elements(parsed(FILES[nodes]))]
@@ -198,7 +208,7 @@ def test_the_page_lists_what_is_without_meaning() -> None:
 STEP = amount(48, 1)
 """Of the places in the sample every so many are tried with a node, others with another."""
 
-OF_ENGINE = [(tag, ports) for nodes in NODES.values() for tag, ports in nodes.items()]
+OF_ENGINE = {tag: ports for nodes in NODES.values() for tag, ports in nodes.items()}
 INNER = {*NODES["control"], *NODES["decorator"]}
 
 
@@ -232,10 +242,9 @@ def edits(nodes: str, tag: str, ports: dict[str, str]) -> list[ET.Element]:
     return changed
 
 
-@pytest.mark.parametrize(("tag", "ports"), OF_ENGINE, ids=[tag for tag, _ in OF_ENGINE])
-@pytest.mark.parametrize("nodes", PROFILES)
-def test_a_node_is_read_or_refused_by_its_name_and_line(nodes: str, tag: str, ports: dict[str, str]) -> None:
-    rng = random.Random(tag)
+@pytest.mark.parametrize(("nodes", "tag"), in_files([*OF_ENGINE], always=READ))
+def test_a_node_is_read_or_refused_by_its_name_and_line(nodes: str, tag: str) -> None:
+    ports, rng = OF_ENGINE[tag], random.Random(tag)
     done = 0
     for document in edits(nodes, tag, ports):
         text = text_of(document)

@@ -11,6 +11,7 @@ import pytest
 from bbtc.version import __version__
 from tests.builder.projects import COIN
 from tests.integration.tools import REPOSITORY, edit, program, recipe, run, runs, tool
+from tests.long_form import LONG
 
 CMAKE_DIR = REPOSITORY / "bbtc" / "cmake"
 DOMAIN, _, PROBLEM = COIN.partition("(define (problem")
@@ -172,7 +173,7 @@ def test_a_compiled_program_has_its_trees_beside_it(source: Path) -> None:
     assert make(build) == []
 
 
-@pytest.mark.parametrize("generator", GENERATORS)
+@pytest.mark.parametrize("generator", GENERATORS if LONG else ["Ninja"])
 def test_a_program_is_compiled_with_the_interface_of_its_robot(source: Path, generator: str) -> None:
     if shutil.which("c++") is None:
         pytest.skip("no C++ compiler")

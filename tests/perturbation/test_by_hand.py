@@ -15,7 +15,7 @@ from tests.perturbation.optimum import DisturbedTask
 from tests.perturbation.rivals import CONTESTED, KINDS, Kind, recovery_of, runs_of, shortfalls, tree_of
 
 TWENTIETH = Fraction(5, 100)
-RUNS = amount(2_000, 100_000)
+RUNS = amount(1_200, 100_000)
 SEED = 11
 
 OUT_OF_REACH = {Problem("kitting", "gift-set"), Problem("warehouse", "one-order")}

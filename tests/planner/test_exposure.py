@@ -65,7 +65,7 @@ def stops(of: Task) -> list[str]:
     return found
 
 
-@examples(amount(60, 3000))
+@examples(amount(42, 3000))
 @given(of=st.one_of(journeys(), errands()))
 def test_no_cheapest_policy_is_harmed_less(of: Task) -> None:
     world = World(of)

@@ -31,7 +31,7 @@ def ladder(steps: int) -> Task:
 
 @pytest.mark.parametrize("strategy", ["strong-cyclic", "auto"])
 def test_a_goal_behind_many_steps_is_planned_for(strategy: str) -> None:
-    tree = plan_task(ladder(70), None, strategy, Limits(), lambda _: None).tree
+    tree = plan_task(ladder(62), None, strategy, Limits(), lambda _: None).tree
     assert tree.success_probability == 1
 
 

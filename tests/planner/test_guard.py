@@ -77,7 +77,7 @@ def test_trees_of_our_domains_keep_to_their_conditions_in_any_state(problem: Pro
         assert verify_tree(tree, Limits(), "own").problems == ()
 
 
-@examples(amount(50, 2000))
+@examples(amount(36, 2000))
 @given(task=tasks(), strategy=st.sampled_from(list(STRATEGIES)), retries=st.sampled_from(RETRIES))
 def test_trees_keep_to_their_conditions_in_any_state_and_succeed_as_often(
     task: Task, strategy: str, retries: Retries

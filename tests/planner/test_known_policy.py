@@ -39,7 +39,7 @@ T, F = Truth.TRUE, Truth.FALSE
 CLOSE = 1e-7
 """What rounding may take from a bound."""
 
-MANY = examples(amount(30, 3000))
+MANY = examples(amount(21, 3000))
 SOME = st.one_of(journeys(), journeys(), tasks(nested=2, most_actions=6))
 STRATEGIES = ("policy", "strong-cyclic")
 

@@ -92,8 +92,8 @@ def test_a_time_limit_ends_every_strategy_within_a_second(
     row: Task, strategy: str, max_actions: int | None
 ) -> None:
     options = Options(max_actions=max_actions)
-    clock = Clock(0.5)
-    limits = Limits(seconds=0.5)
+    clock = Clock(0.3)
+    limits = Limits(seconds=0.3)
     if strategy == "bounds":
         value = task_value(row, limits, options, costs=True)
         assert clock.overrun() < 1

@@ -80,7 +80,7 @@ def test_public_problems_are_solved_at_their_best(problem: Optimum) -> None:
     assert size(done) < 150
 
 
-@examples(amount(100, 300))
+@examples(amount(70, 300))
 @given(of=tasks())
 def test_random_tasks_are_solved_at_their_best_and_least_cost(of: Task) -> None:
     done = plan(of, "1")
@@ -114,7 +114,7 @@ def test_cases_are_solved_at_their_best_within_every_budget(case: Optimum) -> No
         assert size(done) <= 11
 
 
-@examples(amount(70, 200))
+@examples(amount(50, 200))
 @given(of=st.one_of(journeys(), tasks()), budget=st.integers(0, 6))
 @example(of=journey(92), budget=3)  # what nothing helps any more comes to the last phase, too
 def test_random_tasks_are_solved_at_their_best_within_a_budget(of: Task, budget: int) -> None:
@@ -162,7 +162,7 @@ def test_where_no_number_of_tries_is_enough_there_is_no_bound() -> None:
     assert list(retries_of(done.tree.root)) == []
 
 
-@examples(amount(50, 150))
+@examples(amount(35, 150))
 @given(of=tasks(), target=st.sampled_from(["1/3", "0.9", "0.999"]))
 def test_one_attempt_less_would_miss_the_target(of: Task, target: str) -> None:
     done = plan(of, target, options=LEAST)

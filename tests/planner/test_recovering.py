@@ -28,7 +28,7 @@ from tests.disturbance.reference import Exact, best_next, reachable
 from tests.domains.problems import PROBLEMS, Problem, task_of
 from tests.long_form import amount
 from tests.planner.journeys import journey, journeys
-from tests.planner.test_auto import plan
+from tests.planner.test_auto import told
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -43,7 +43,7 @@ def tree_of(task: Task) -> Node:
     return found.root
 
 
-@examples(amount(80, 3000))
+@examples(amount(50, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 @example(of=journey(20308515))  # runs of even the best policies take thousands of steps
 def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) -> None:
@@ -57,7 +57,7 @@ def test_from_every_state_that_actions_lead_to_the_best_is_attained(of: Task) ->
         assert attained[state] >= best_next(of, state, attained) - 1e-9
 
 
-@examples(amount(80, 3000))
+@examples(amount(50, 3000))
 @given(of=st.one_of(journeys(), tasks(most_actions=4)))
 def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
     found = recovering_tree(of, Limits())
@@ -78,7 +78,7 @@ def test_trees_of_our_domains_recover(problem: Problem) -> None:
         pytest.skip("there is no end to what may be believed")
     if problem.domain in LARGE and problem.name != "after-the-alarm":
         pytest.skip("too many states for each")
-    done = plan(of, "auto")
+    done, _ = told(problem)
     found = recovery(of, done.tree.root, Limits())
     assert (found.attained, found.missed) == (found.hopeful, 0)
     assert verify_tree(guarded(done).tree, Limits(), "own").problems == ()

@@ -70,7 +70,7 @@ def by_arrays(space: StateSpace) -> dict[Values, dict[Step, Fraction]]:
     return found
 
 
-@examples(amount(120, 300))
+@examples(amount(84, 300))
 @given(task=tasks(nested=2))
 def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> None:
     space = explore_space(task, Limits())
@@ -82,7 +82,7 @@ def test_random_tasks_span_the_same_space_as_in_the_simulator(task: Task) -> Non
         assert holds == (evaluate(task.goal, values) is Truth.TRUE)
 
 
-@examples(amount(40, 100))
+@examples(amount(28, 100))
 @given(task=tasks(nested=2))
 def test_actions_with_very_many_outcomes_and_disjuncts_take_another_way_to_the_same(task: Task) -> None:
     with patch.multiple(space_actions, MOST_OUTCOMES=1, MOST_CUBES=1):
@@ -159,7 +159,7 @@ def test_a_limit_leaves_the_rest_unexpanded_and_is_named() -> None:
     assert "3 states" in space.stop.message
 
 
-@examples(amount(40, 100))
+@examples(amount(28, 100))
 @given(
     rows=st.lists(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), max_size=40), max_size=20),
     bits=st.sampled_from([0, 3, 62]),
@@ -193,7 +193,7 @@ def test_conditions_of_any_shape_become_cubes() -> None:
     assert space_packing.bit_test(packing, Is(1, Truth.UNKNOWN)) == space_packing.NEVER
 
 
-@examples(amount(20, 60))
+@examples(amount(14, 60))
 @given(values=st.lists(st.sampled_from([0, 1, 2]), min_size=90, max_size=90), seed=st.integers(0, 2**32))
 def test_conditions_over_several_words_hold_where_the_semantics_say(values: list[int], seed: int) -> None:
     """A conjunction of what most of the variables are, and one that is wrong in a place."""
@@ -212,7 +212,7 @@ def test_conditions_over_several_words_hold_where_the_semantics_say(values: list
         assert space_packing.holds(packing, test, rows).tolist() == expected
 
 
-@examples(amount(40, 100))
+@examples(amount(28, 100))
 @given(task=tasks(nested=2), every=st.integers(1, 3))
 def test_the_closure_is_what_a_walk_over_single_choices_finds(task: Task, every: int) -> None:
     space = explore_space(task, Limits())

@@ -58,7 +58,7 @@ def plan(of: Task, limits: Limits | None = None) -> Plan:
     return plan_task(of, Fraction(1), "strong-cyclic", limits or Limits(), lambda _: None)
 
 
-@examples(amount(120, 5000))
+@examples(amount(56, 5000))
 @given(of=tasks(most_actions=6))
 def test_random_tasks_have_a_policy_where_enumeration_finds_one(of: Task) -> None:
     _, safe = strong_cyclic_states(of)
@@ -74,7 +74,7 @@ def test_random_tasks_have_a_policy_where_enumeration_finds_one(of: Task) -> Non
         assert done.tree.success_probability == best, "the best policy is written all the same"
 
 
-@examples(amount(120, 5000))
+@examples(amount(56, 5000))
 @given(of=tasks(most_actions=6))
 def test_what_is_learnt_of_dead_ends_and_invariants_is_true_of_every_reachable_state(of: Task) -> None:
     reachable, safe = strong_cyclic_states(of)
@@ -96,7 +96,7 @@ def test_what_is_learnt_of_dead_ends_and_invariants_is_true_of_every_reachable_s
                 assert not {result.values for result in results} <= safe
 
 
-@examples(amount(80, 5000))
+@examples(amount(56, 5000))
 @given(of=tasks(most_actions=6), random=st.randoms(use_true_random=False))
 def test_steps_are_those_of_the_simulator_and_regression_is_enough(of: Task, random: object) -> None:
     """From any state that satisfies what a step was regressed to, the step may be taken and leads there."""
@@ -127,7 +127,7 @@ def test_steps_are_those_of_the_simulator_and_regression_is_enough(of: Task, ran
                             assert step.apply(other) & wanted.mask == wanted.value
 
 
-@examples(amount(80, 5000))
+@examples(amount(56, 5000))
 @given(of=tasks(most_actions=6))
 def test_the_quotient_of_a_chain_has_the_figures_of_the_chain(of: Task) -> None:
     solver = Solver(of, Limits())
@@ -140,7 +140,7 @@ def test_the_quotient_of_a_chain_has_the_figures_of_the_chain(of: Task) -> None:
     assert replace(whole, states=0, failures=()) == replace(small, states=0, failures=())
 
 
-@examples(amount(80, 5000))
+@examples(amount(56, 5000))
 @given(data=st.data())
 def test_the_quotient_of_any_tree_without_memory_has_the_figures_of_its_chain(data: st.DataObject) -> None:
     """Trees that read what is unknown, too, with guarded actions and loops."""
@@ -167,7 +167,7 @@ def test_a_contradiction_of_what_is_unknown_is_unknown_in_the_quotient_too() -> 
         assert (found.blocked, found.failure) == (1, 0)
 
 
-@examples(amount(100, 5000))
+@examples(amount(70, 5000))
 @given(data=st.data())
 def test_states_with_the_explanation_of_another_have_its_figures(data: st.DataObject) -> None:
     """Every assignment of values is tried that keeps to the groups of which one member is true."""
@@ -197,7 +197,7 @@ def test_states_with_the_explanation_of_another_have_its_figures(data: st.DataOb
             assert outcome(values) == outcome(like)
 
 
-@examples(amount(60, 5000))
+@examples(amount(42, 5000))
 @given(of=tasks(most_actions=6), random=st.randoms(use_true_random=False))
 def test_a_distance_does_not_depend_on_what_was_asked_before(of: Task, random: Random) -> None:
     """The relaxation goes from state to state by what differs, and learns what is forbidden on the way."""
@@ -222,7 +222,7 @@ def test_a_distance_does_not_depend_on_what_was_asked_before(of: Task, random: R
             solver.relaxation.forbid(action, literal)
 
 
-@examples(amount(60, 5000))
+@examples(amount(42, 5000))
 @given(of=tasks(most_actions=6))
 def test_short_rules_decide_as_the_policy_in_every_state_they_were_told(of: Task) -> None:
     """Of the tree, as the engine ticks it: the same action, whatever the guards were shortened to."""
@@ -243,7 +243,7 @@ def test_short_rules_decide_as_the_policy_in_every_state_they_were_told(of: Task
             assert starts[0][plain - STARTED] == starts[1][short - STARTED]
 
 
-@examples(amount(80, 5000))
+@examples(amount(56, 5000))
 @given(of=tasks(most_actions=4), random=st.randoms(use_true_random=False))
 def test_what_rules_share_is_read_once_and_nothing_else_changes(of: Task, random: Random) -> None:
     """In every assignment of values the same action, or none, and never a larger tree."""
@@ -317,7 +317,7 @@ def forgetful(node: Node) -> Node:
             return node
 
 
-@pytest.mark.parametrize("seed", range(amount(40, 1000)))
+@pytest.mark.parametrize("seed", range(amount(28, 1000)))
 def test_a_policy_that_is_proven_leads_on_from_every_state_it_leads_to(seed: int) -> None:
     """By enumeration of the states that it leads to, those not visited for the proof among them."""
     random = Random(seed)
@@ -341,7 +341,7 @@ def test_a_policy_that_is_proven_leads_on_from_every_state_it_leads_to(seed: int
     assert surely == set(states)
 
 
-@examples(amount(60, 5000))
+@examples(amount(42, 5000))
 @given(of=tasks(most_actions=6))
 def test_whatever_the_state_no_action_starts_without_its_precondition_and_success_means_the_goal(
     of: Task,
@@ -586,12 +586,12 @@ def test_trees_do_not_depend_on_the_seed_of_hashes() -> None:
             check=True,
             cwd=REPOSITORY,
         ).stdout
-        for seed in (1, 2, 3)
+        for seed in (1, 2)
     }
     assert len(printed) == 1
 
 
-@pytest.mark.parametrize("seed", range(amount(60, 2000)))
+@pytest.mark.parametrize("seed", range(amount(42, 2000)))
 def test_random_walks_are_taken_where_enumeration_finds_a_sure_way(seed: int) -> None:
     """Loops, dead ends that depend on what was used up, ways around them."""
     random = Random(seed)

@@ -28,7 +28,7 @@ from tests.strategies import tasks
 T = Truth.TRUE
 
 
-@examples(amount(200, 5000))
+@examples(amount(140, 5000))
 @given(of=tasks(most_actions=6))
 def test_by_novelty_a_plan_is_found_where_there_is_one(of: Task) -> None:
     states, _ = strong_cyclic_states(of)
@@ -60,7 +60,7 @@ def test_by_novelty_a_plan_is_found_where_there_is_one(of: Task) -> None:
         assert satisfied(model.goal, at)
 
 
-@examples(amount(100, 3000))
+@examples(amount(70, 3000))
 @given(of=tasks(most_actions=6))
 def test_policies_are_found_whichever_search_finds_the_plans(of: Task) -> None:
     """By novelty from the first moment on."""
@@ -70,7 +70,7 @@ def test_policies_are_found_whichever_search_finds_the_plans(of: Task) -> None:
     assert (done.tree.status == "target-reached") == (set(initial_belief(of)) <= safe)
 
 
-@examples(amount(100, 3000))
+@examples(amount(70, 3000))
 @given(of=tasks(most_actions=6))
 def test_starts_are_sure_where_a_policy_surely_reaches_the_goal(of: Task) -> None:
     states, safe = strong_cyclic_states(of)

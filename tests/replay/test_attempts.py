@@ -23,8 +23,8 @@ from tests.replay.reference import expected_run, expected_ticks, varied_runs
 from tests.replay.ticks import random_script, trace
 from tests.sharing import shared
 
-TREES = amount(60, 1000)
-SIMULATED = amount(200, 2000)
+TREES = amount(45, 1000)
+SIMULATED = amount(140, 2000)
 SCENARIOS = 20
 
 

@@ -2,7 +2,7 @@
 ticks, during the run of an action and within the tick that starts it, has the same actions in the
 same order, the same end, and the same final state.
 
-Usually 256 trees with those of at most 30 scenarios each (all of three trees in four) in which all happens
+Usually 192 trees with those of at most 30 scenarios each (all of three trees in four) in which all happens
 that happens in any, with one timing after the other, another one in each engine; ``BBTC_LONG=1`` takes 1,000
 trees and up to 500 scenarios, each with every timing.
 """
@@ -28,7 +28,7 @@ from tests.replay.reference import expected_run
 from tests.sharing import shared
 
 CHUNKS = 8
-TREES = amount(32, 125)
+TREES = amount(24, 125)
 """Trees of a chunk."""
 
 MOST = amount(30, 500)

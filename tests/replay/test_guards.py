@@ -32,7 +32,7 @@ ENGINES: list[Callable[[Tree], Replay]] = [lambda tree: PyTreesReplay(tree, "imp
 if importlib.util.find_spec("behaviortreepy") is not None:  # there is no wheel of it for some platforms
     ENGINES.append(BtcppReplay)
 PLANS = [*((name, Options()) for name in STRATEGIES), ("refine", Options(closed_world=True))]
-GROUP = 40
+GROUP = amount(28, 40)
 RUNS = 6
 TICKS = 25
 

@@ -23,7 +23,7 @@ from tests.replay.reference import Running, expected_ticks, value_of
 from tests.replay.ticks import Tick, TickScript, TickWorld, random_script, trace
 from tests.sharing import shared
 
-TREES = amount(200, 2000)
+TREES = amount(140, 2000)
 SCRIPTS = 5
 TICKS = 20
 """Ticks of a script; most trees end sooner."""
@@ -106,7 +106,7 @@ def test_plans_are_sound_whatever_changes(problem: Problem, options: Options | N
     tree, rng = tree_of(problem, "refine"), random.Random(1)
     if options is not None:
         tree = plan_task(tree.task, None, "auto", Limits(), lambda _: None, options=options).tree
-    for _ in range(200):
+    for _ in range(amount(100, 200)):
         script = random_script(tree.task, rng, TICKS)
         world = WatchedWorld(tree.task, script)
         world.starts = []

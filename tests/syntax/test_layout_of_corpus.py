@@ -1,6 +1,6 @@
 """Layout over the corpus of public files: it changes no tree, no comment, and is stable.
 
-The files are those of the corpus that parse; continuous integration takes each 20th of them, and
+The files are those of the corpus that parse; continuous integration takes each 40th of them, and
 ``BBTC_LONG=1`` all (``tests.corpus`` counts which parse, and that what is printed holds the same words).
 """
 
@@ -17,7 +17,7 @@ from bbtc.syntax.printer import print_document
 from bbtc.syntax.reader import read_source
 from tests.long_form import amount
 
-EVERY = amount(20, 1)
+EVERY = amount(40, 1)
 
 
 def test_layout_keeps_trees_and_comments_and_is_stable(corpus: Path) -> None:

@@ -13,8 +13,9 @@ from lark import Lark
 from lark.grammar import Rule
 
 from bbtc.source import SourceFile
-from bbtc.syntax.build import Builder, Field
+from bbtc.syntax.build import Builder
 from bbtc.syntax.engine import Engine, Token
+from bbtc.syntax.fields import Field
 from bbtc.syntax.tables import START, Production, grammar_text, tables
 
 # --- types of the productions ----------------------------------------------------------------

@@ -21,7 +21,7 @@ from bbtc.verifier.chain import chain_of
 from bbtc.verifier.naming import numbered
 from bbtc.verifier.prism import prism_text
 from bbtc.verifier.verdict import verify
-from tests.long_form import amount
+from tests.long_form import LONG, amount
 from tests.planner.examples import Optimum, cases
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -64,9 +64,17 @@ def test_plans_for_random_tasks(task: Task, strategy: str, retries: Retries, mos
     check(plan.tree)
 
 
-@pytest.mark.parametrize("retries", RETRIES)
-@pytest.mark.parametrize("strategy", list(STRATEGIES))
-@pytest.mark.parametrize("case", cases(), ids=lambda c: c.name)
+HOW = [
+    (case, strategy, retries)
+    for row, case in enumerate(cases())
+    for column, strategy in enumerate(STRATEGIES)
+    for number, retries in enumerate(RETRIES)
+    if LONG or (row + column) % 2 == number
+]
+"""Each case with each strategy; in the short form with retries without end, or with the fewest."""
+
+
+@pytest.mark.parametrize(("case", "strategy", "retries"), HOW, ids=lambda each: getattr(each, "name", each))
 def test_plans_for_the_shared_cases(case: Optimum, strategy: str, retries: Retries) -> None:
     limits = Limits(seconds=60)
     plan = plan_task(case.task(), None, strategy, limits, lambda _: None, options=Options(retries=retries))

@@ -77,13 +77,13 @@ def test_random_trees_full_of_actions(first: int) -> None:
 
 
 def test_random_trees_that_try_again() -> None:
-    for seed in range(amount(10, 500)):
+    for seed in range(amount(6, 500)):
         tree = with_attempts(random_tree(seed, latched=0.7), seed)
         for form in ("auto", "walk"):
             assert ask(prism.export(tree, {"form": form}, None), TREE) == expected(tree), (seed, form)
 
 
-@examples(amount(12, 1000))
+@examples(amount(8, 1000))
 @given(tree=trees(HOSTILE_NAMES))
 def test_exports_with_hostile_names_are_read_and_mean_the_same(tree: Tree) -> None:
     figures = simulate(tree.task, tree.root, Limits())
@@ -147,7 +147,7 @@ def test_the_listed_values_of_the_cases(case: Optimum) -> None:
     assert ask(prism_task(task), TASK) == [best]
 
 
-@examples(amount(30, 2000))
+@examples(amount(20, 2000))
 @given(task=tasks())
 def test_the_best_that_any_policy_can_do(task: Task) -> None:
     """Bounds of the planner, our own policy iteration and Storm, which know nothing of one another."""

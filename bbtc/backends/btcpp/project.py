@@ -84,6 +84,10 @@ def _plain_files(tree: Tree, names: BtcppNames, program: Program) -> dict[str, s
         "simulated_robot.hpp": SimulatedRobotWriter(tree, names, leaves, space).header(),
         "simulate.cpp": cppcode.fill(_static("simulate.cpp"), ROBOT_TREE=space),
     }
+    if tree.task.events:
+        files["moving_world.hpp"] = cppcode.fill(_static("moving_world.hpp"), ROBOT_TREE=space)
+        files["simulated_world.hpp"] = files["simulated_world.hpp"].replace(" private:", " protected:")
+        files["README.md"] += _README_MOVING
     if tree.monitor is not None:
         files |= monitor_files(tree.task, names, tree.monitor, space)
         files["hidden_world.hpp"] = cppcode.fill(_static("hidden_world.hpp"), ROBOT_TREE=space)
@@ -143,6 +147,10 @@ robot.monitor());
 _README_MONITOR = """\
 | `monitor*.hpp` | what is known of hidden facts, by what the robot tells `monitor()` |
 | `hidden_world.hpp` | the simulated world's hidden facts, and what is told of them |
+"""
+
+_README_MOVING = """\
+| `moving_world.hpp` | what happens by itself in the simulated world |
 """
 
 _README = """\

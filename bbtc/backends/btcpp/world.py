@@ -9,6 +9,7 @@ from bbtc.backends.btcpp.leaves import LeafWriter
 from bbtc.backends.btcpp.monitor import MonitorTable, braces, key_code, key_of
 from bbtc.backends.btcpp.names import BtcppNames
 from bbtc.backends.interface import Leaf, action_symbol, variable_symbol
+from bbtc.backends.shape import normal
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
 from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
 from bbtc.ground.task import Factor, Outcome, Variable
@@ -36,6 +37,16 @@ class SimulatedRobot : public Robot {
       : world_(model(), seed, ticks, report) {}
 
   SimulatedWorld& world() { return world_; }
+"""
+
+
+_MOVING_CLASS = """\
+class SimulatedRobot : public Robot {
+ public:
+  SimulatedRobot(std::uint64_t seed, unsigned ticks, std::ostream* report)
+      : world_(model(), moves(), seed, ticks, report) {}
+
+  MovingWorld& world() { return world_; }
 """
 
 
@@ -67,7 +78,11 @@ class SimulatedRobotWriter:
         if self._tree.monitor is not None:
             head = head.replace('"simulated_world.hpp"', '"hidden_world.hpp"')
             kind, begun = "HiddenWorld", _HIDDEN_CLASS
+        elif self._task.events:
+            head = head.replace('"simulated_world.hpp"', '"moving_world.hpp"')
+            kind, begun = "MovingWorld", _MOVING_CLASS
         lines = [cppcode.fill(head, ROBOT_TREE=self._space) + self._model()]
+        lines += [self._moves()] if self._task.events else []
         lines += [] if self._tree.monitor is None else [self._hidden(self._tree.monitor)]
         lines += [begun.rstrip(), *map(self._method, self._leaves.asked())]
         lines += ["", " private:", f"  {kind} world_;", "};", ""]
@@ -95,6 +110,37 @@ class SimulatedRobotWriter:
                 f"      /*facts=*/{_rows(facts)},",
                 f"      /*initial=*/{_rows(initial)},",
                 f"      /*actions=*/{_rows(actions)}}};",
+                "  return all;",
+                "}",
+                "",
+            ]
+        )
+
+    def _moves(self) -> str:
+        """What happens by itself, and which actions that may end."""
+        rounds = [
+            _rows(
+                [
+                    f"Event{{{self._anywhere(normal(self._task, event.precondition))}, "
+                    f"{self._factors(event.factors)}}}"
+                    for event in events
+                ]
+            )
+            for events in self._task.rounds
+        ]
+        interrupted = [
+            f"{{{cppcode.literal(key_of(self._names, action_symbol(action), action.args))},\n"
+            f"           Interruption{{{self._lambda(normal(self._task, action.during))}, "
+            f"{self._factors(action.on_abort)}}}}}"
+            for action in actions_used(self._tree)
+            if action.during is not None
+        ]
+        return "\n".join(
+            [
+                "inline const Moves& moves() {",
+                "  static const Moves all = {",
+                f"      /*rounds=*/{_rows(rounds)},",
+                f"      /*interrupted=*/{_rows(interrupted)}}};",
                 "  return all;",
                 "}",
                 "",
@@ -152,6 +198,9 @@ class SimulatedRobotWriter:
         when = "nullptr" if observation.when is None else self._lambda(observation.when)
         items = [cppcode.literal(telling.name), f"{right}u", f"{wrong}u"]
         return f"Telling{braces([*items, self._lambda(observation.condition), when])}"
+
+    def _anywhere(self, condition: Condition) -> str:
+        return "nullptr" if condition == TRUE else self._lambda(condition)
 
     def _lambda(self, condition: Condition) -> str:
         return f"[](const State& s) {{ return {self._test(condition)}; }}"

@@ -103,13 +103,12 @@ class _Writer:
         tables = [self._reads(), *self.world.tables()]
         # Without the methods of the robots, whose parameters may be named like anything.
         used = {"Fact", "Protocol", "Status", "run"}
-        used |= {"World"} if self.monitor is None else {"HiddenWorld", "Monitor", "Part"}
-        used |= {"NumberWorld"} if self.task.numbers else set()
+        used |= {self.world.base} if self.monitor is None else {"HiddenWorld", "Monitor", "Part"}
         used |= used_in(line for block in [*trees, *tables, main] for line in block)
         if self.embedded:
             used = needed(used)
             nodes, world, head = copied("nodes", used), copied("world", used), imports(used)
-            world += copied("monitor", used) + copied("numbers", used)
+            world += [*copied("monitor", used), *copied("moving", used), *copied("numbers", used)]
         else:
             nodes, world, head = [], [], imports(used, ("bbtc.runtime", defined(used)))
             head += ["", _PUBLIC if self.monitor is None else _PUBLIC_HIDDEN]
@@ -120,7 +119,7 @@ class _Writer:
 
     def _main(self) -> str:
         if self.monitor is None:
-            return _MAIN
+            return _MAIN_MOVING if self.task.events else _MAIN
         walks = ", walks=WALKS" if self.monitor.walks else ""
         return _MAIN_HIDDEN.replace("parts=MONITOR", f"parts=MONITOR{walks}")
 
@@ -289,6 +288,23 @@ _MAIN = '''\
 def main() -> None:
     """Run the tree in the simulated world."""
     simulate(lambda rng, report: create_root(SimulatedWorld(INITIAL, ACTIONS, rng, report)))
+
+
+if __name__ == "__main__":
+    main()
+'''
+
+_MAIN_MOVING = '''\
+def main() -> None:
+    """Run the tree in the simulated world."""
+
+    def make(rng: random.Random, report: Callable[[str], None]) -> Behaviour:
+        world = SimulatedWorld(
+            INITIAL, ACTIONS, rng, report, events=EVENTS, interrupted=INTERRUPTED
+        )
+        return create_root(world)
+
+    simulate(make)
 
 
 if __name__ == "__main__":

@@ -18,8 +18,9 @@ from bbtc.backends.pytrees.parts import (
     words_tuple,
 )
 from bbtc.backends.pytrees.pycode import Code, Prefixed, call, flat, layout, literal, mapping, sequence
+from bbtc.backends.shape import normal
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
-from bbtc.ground.condition import number_in
+from bbtc.ground.condition import Condition, number_in
 from bbtc.ground.task import Factor, NumberChange, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree
@@ -52,7 +53,9 @@ class WorldWriter:
             (words_tuple((action.schema, *action.args)), self._factors(action.factors))
             for action in self._actions
         )
-        more = []
+        more: list[list[str]] = []
+        if self._task.events:
+            more = self._moving()
         if self._monitor is not None:
             more = MonitorWriter(self._task, self._monitor, self._conditions).tables()
         return [
@@ -64,11 +67,47 @@ class WorldWriter:
             *more,
         ]
 
+    @property
+    def base(self) -> str:
+        """The class of the simulated world's behaviour."""
+        if self._monitor is not None:
+            return "HiddenWorld"
+        numbers = "Number" if self._numbers else ""
+        return f"Moving{numbers}World" if self._task.events else f"{numbers}World"
+
+    def _moving(self) -> list[list[str]]:
+        """``EVENTS`` and ``INTERRUPTED``."""
+        events = sequence(
+            sequence(
+                call("", self._test(event.precondition), self._factors(event.factors)) for event in events
+            )
+            for events in self._task.rounds
+        )
+        interrupted = mapping(
+            (
+                words_tuple((action.schema, *action.args)),
+                call("", self._test(action.during), self._factors(action.on_abort)),
+            )
+            for action in self._actions
+            if action.during is not None
+        )
+        return [
+            [
+                *layout(events, "EVENTS: list[list[tuple[Test, list[Factor]]]] = "),
+                '"""What happens by itself, round by round: where it may, and what it does."""',
+            ],
+            [
+                *layout(interrupted, "INTERRUPTED: dict[Fact, tuple[Test, list[Factor]]] = "),
+                '"""While what actions go on that events may end, and what happens else."""',
+            ],
+        ]
+
+    def _test(self, condition: Condition) -> Code:
+        return Prefixed("lambda s: ", self._conditions.write(normal(self._task, condition), self._read))
+
     def world(self) -> list[str]:
         """The class ``SimulatedWorld``."""
-        base = "World" if self._monitor is None else "HiddenWorld"
-        base = "NumberWorld" if self._numbers else base
-        lines = [f"class SimulatedWorld({base}):", '    """Plays the robot."""']
+        lines = [f"class SimulatedWorld({self.base}):", '    """Plays the robot."""']
         for leaf in self._interface.asked:
             answer = flat(call("self._number" if leaf.counts else "self._value", *fact_of(leaf)))
             lines += method(self._methods[leaf.symbol], leaf, condition_type(leaf), f"return {answer}")

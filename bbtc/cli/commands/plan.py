@@ -18,6 +18,7 @@ from bbtc.cli.session import (
     Count,
     Probability,
     Session,
+    Time,
     output_options,
     planning_limits,
     problem_options,
@@ -25,6 +26,7 @@ from bbtc.cli.session import (
 from bbtc.cli.session import (
     command as session_command,
 )
+from bbtc.cli.within_time import WithinTime
 from bbtc.diagnostics import LimitReached
 from bbtc.exit_status import OF_TREE, ExitStatus
 from bbtc.planner.strategies import DEFAULT, others
@@ -63,6 +65,12 @@ _TELLING = 1.0
     help="Of trees that meet the target: the one of most success, least cost, or fewest nodes.",
 )
 @click.option(
+    "--deadline",
+    type=Time(),
+    metavar="SECONDS",
+    help="Plan for success within so many seconds: the target is one of that.",
+)
+@click.option(
     "--closed-world",
     is_flag=True,
     help="Leave out what is read only in case that others change the world, too.",
@@ -89,6 +97,7 @@ def command(
     max_actions: int | None,
     retries: Retries,
     prefer: Prefer,
+    deadline: Fraction | None,
     closed_world: bool,
     guarded: bool,
     allow_guess: bool,
@@ -116,6 +125,8 @@ def command(
 
     if as_json and not bounds:
         raise click.UsageError("--json goes with --bounds: a tree is always written as JSON.")
+    if deadline is not None and (bounds or max_actions is not None):
+        raise click.UsageError("--deadline goes with neither --bounds nor --max-actions.")
     if closed_world and guarded:
         raise click.UsageError("--closed-world and --guarded contradict each other.")
     limits = session.limits
@@ -127,7 +138,10 @@ def command(
         wanted = task.goal_probability if target is None else target
         return _print_bounds(session, task, wanted, options, output, as_json=as_json)
     with best_tree_on_signals() as signals:
-        plan = run_planner(session, task, target, strategy, limits, options, quiet=quiet, signals=signals)
+        within = None if deadline is None else WithinTime(deadline)
+        plan = run_planner(
+            session, task, target, strategy, limits, options, quiet=quiet, signals=signals, within=within
+        )
         if verified:
             from bbtc.cli.commands.verify import require_verified
 
@@ -167,6 +181,7 @@ def run_planner(
     *,
     quiet: bool,
     signals: Signals,
+    within: WithinTime | None = None,
 ) -> Plan:
     """Plan, telling the session each refinement as it is made and how planning ended. Afterwards neither a
     limit nor a signal keeps the tree from being written."""
@@ -201,7 +216,8 @@ def run_planner(
         session.watch.off()
 
     limits.tell("planning")
-    plan = plan_task(
+    planner = plan_task if within is None else within.plan
+    plan = planner(
         task,
         target,
         strategy,
@@ -219,24 +235,29 @@ def run_planner(
             hint="another strategy may reach it",
         )
     most = options.max_actions
-    ends: tuple[DeadEnd, ...] = ()
-    if plan.tree.status == "out-of-reach":
-        from bbtc.planner.why_not import dead_ends
-
-        with suppress(LimitReached):
-            ends = dead_ends(plan.tree, limits.overtime(_TELLING))
+    ends = _dead_ends(plan, limits)
     made = simplified_line(told[-1], plan.tree) if told and not quiet else []
     lines = [
         *made,
-        *plan_summary(plan, most),
+        *(plan_summary(plan, most) if within is None else within.summary(plan)),
         *worst_world_line(plan.figures),
         *(f"readings {note}" for note in rerolled_note(plan.rerolled)),
-        *bounds_lines(plan.tree, most),
+        *(bounds_lines(plan.tree, most) if within is None else []),
         *dead_end_lines(plan.tree, ends, most),
     ]
     for line in lines:
         session.say(line)
     return plan
+
+
+def _dead_ends(plan: Plan, limits: Limits) -> tuple[DeadEnd, ...]:
+    """Why the target is out of reach, if it is, as far as that is found soon."""
+    if plan.tree.status == "out-of-reach":
+        from bbtc.planner.why_not import dead_ends
+
+        with suppress(LimitReached):
+            return dead_ends(plan.tree, limits.overtime(_TELLING))
+    return ()
 
 
 @dataclass(slots=True)

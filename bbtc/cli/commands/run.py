@@ -256,7 +256,7 @@ def _tree_lines(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
 
 
 def _state(tree: Tree, values: bytes) -> str:
-    from bbtc.ground.task import values_in_words
+    from bbtc.ground.describe import values_in_words
     from bbtc.printable import printable
 
     found = values_in_words(tree.task.variables, values)

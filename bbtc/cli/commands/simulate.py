@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
-from bbtc.cli.session import Count, Probability, Seed, Session, limit_options, problem_options
+from bbtc.cli.session import Count, Probability, Seed, Session, Time, limit_options, problem_options
 from bbtc.cli.session import command as session_command
 from bbtc.diagnostics import LimitReached
 
 if TYPE_CHECKING:
     from bbtc.belief.scenarios import Scenario
+    from bbtc.cli.time_report import ToldTimes
     from bbtc.limits import Limits
     from bbtc.tree.nodes import Tree
 
@@ -52,6 +53,8 @@ if TYPE_CHECKING:
     metavar="N",
     help="List the N most probable runs that fail, each with the fact it lacks at its root.",
 )
+@click.option("--time-step", type=Time(), metavar="S", help="Step of the curve of success by a time.")
+@click.option("--curve", metavar="FILE.svg", help="Also write that curve, as a picture.")
 @click.option("--json", "as_json", is_flag=True, help="Write the figures as JSON instead of text.")
 @click.option("-o", "--output", default="-", metavar="FILE", help="Where to write; - is stdout (default).")
 @problem_options
@@ -69,6 +72,8 @@ def command(
     max_ticks: int,
     recovery: bool,
     seed: int,
+    time_step: Fraction | None,
+    curve: str | None,
     as_json: bool,
     output: str,
 ) -> None:
@@ -80,16 +85,21 @@ def command(
     from bbtc.belief.rerolled import rerolled
     from bbtc.belief.scenarios import sample
     from bbtc.belief.scenarios import scenarios as listing
+    from bbtc.cli.time_report import told_times
     from bbtc.cli.wording import failing_lines, figures_report, rerolled_note
     from bbtc.pipeline import simulate_tree, with_worst_world
     from bbtc.planner.failing_runs import failing_runs
     from bbtc.printable import printable
 
-    session.expect_output(output, [tree, *others])
+    for place in (output, *([] if curve is None else [curve])):
+        session.expect_output(place, [tree, *others])
     loaded = _tree(session, tree, others)
     limits = session.limits
     figures, chain = simulate_tree(loaded, limits)
     figures = with_worst_world(loaded, figures, limits)
+    taken = told_times(loaded, figures, chain, limits, time_step)
+    if curve is not None:
+        session.write(curve, taken.picture())
     session.clear()
     listed, stop = _until_limit(itertools.islice(listing(chain, limits), scenarios))
     failed, stop_failing = _until_limit(failing_runs(loaded, chain, limits, failing))
@@ -106,20 +116,21 @@ def command(
         from bbtc.artefacts.numbers import figure_text
 
         data = figures_to_json(loaded, figures, listed, sampled) | disturbed.data
+        taken.add_to(data, listed)
         data["failing_runs"] = [failing_run_to_json(loaded, each) for each in failed]
         again = rerolled(loaded.task, chain)
         data |= {"rerolled": list(again)} if again else {}
         data["other_failing_runs"] = figure_text(rest)
         session.write(output, dumps(data))
     else:
-        lines = figures_report(loaded, figures)
+        lines = [*figures_report(loaded, figures), *taken.lines()]
         lines += [f"readings  {note}" for note in rerolled_note(rerolled(loaded.task, chain))]
         if sampled is not None:
             share = sampled.successes / sampled.samples
             lines.append(f"sampled   {share:.6g} of {sampled.samples} runs succeed (seed {sampled.seed})")
         lines.extend(disturbed.lines)
         lines.extend(failing_lines(loaded, failed, rest))
-        lines.extend(_scenario_lines(loaded, listed))
+        lines.extend(_scenario_lines(loaded, listed, taken))
         session.write(output, "".join(f"{printable(line)}\n" for line in lines))
     for reached in (stop, stop_failing, disturbed.stop):
         if reached is not None:
@@ -179,7 +190,7 @@ class _Disturbed:
         self.lines.extend(recovery_lines(self.tree, found, self.whole))
 
 
-def _scenario_lines(tree: Tree, listed: list[Scenario]) -> list[str]:
+def _scenario_lines(tree: Tree, listed: list[Scenario], taken: ToldTimes) -> list[str]:
     from bbtc.artefacts.numbers import exact
     from bbtc.belief.tick import NodeStatus
     from bbtc.cli.wording import run_lines
@@ -187,7 +198,7 @@ def _scenario_lines(tree: Tree, listed: list[Scenario]) -> list[str]:
     lines = []
     for number, run in enumerate(listed, 1):
         ending = "blocked" if run.status is NodeStatus.RUNNING else run.status.word
-        lines.append(f"run {number}: probability {exact(run.probability)}, {ending}")
+        lines.append(f"run {number}: probability {exact(run.probability)}, {ending}{taken.of(run)}")
         lines.extend(f"  {line}" for line in run_lines(tree, run))
     return lines
 

@@ -87,7 +87,23 @@ def verdict_report(verdict: Verdict) -> list[str]:
         lines.append(f"actions   {expected(own.actions, own.actions_given_success)}")
         if tree.task.counts_reward:
             lines.append(f"reward    {expected(own.reward, None)}")
+        lines += _time(verdict)
     lines.append("refused" if verdict.problems else "verified")
+    return lines
+
+
+def _time(verdict: Verdict) -> list[str]:
+    """How long the tree takes, as far as that is known."""
+    from bbtc.cli.wording import expected
+    from bbtc.rounding import decimal
+
+    time, by = verdict.time, verdict.tree.success_by
+    if time is None:
+        return [] if by is None else ["time      not recomputed"]
+    lines = [f"time      {expected(time.expected, time.given_success)}, in seconds"]
+    if by is not None and time.by is not None:
+        bounds = f"from {time.by[0]:.9g} to {time.by[1]:.9g}"
+        lines.append(f"in time   {bounds}, within {decimal(by.seconds, 12)} s")
     return lines
 
 

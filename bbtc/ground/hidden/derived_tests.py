@@ -74,7 +74,7 @@ class _Asking:
                 return replace(body, children=tuple(map(self.body, children)))
             case md.BodyCondition(condition):
                 return replace(body, condition=self.formula(condition))
-            case md.BodyForeach(_, child):
+            case md.BodyForeach(_, child) | md.BodyRetry(_, child):
                 return replace(body, child=self.body(child))
             case md.BodyCall():
                 return body

@@ -131,6 +131,8 @@ class _Rewriting:
                     schema,
                     precondition=self.formula(schema.precondition),
                     effect=self.effect(schema.effect),
+                    during=None if schema.during is None else self.formula(schema.during),
+                    on_abort=self.effect(schema.on_abort),
                 )
                 for name, schema in model.schemas.items()
             },
@@ -153,7 +155,7 @@ class _Rewriting:
                 return replace(body, children=tuple(map(self._body, children)))
             case md.BodyCondition(condition):
                 return replace(body, condition=self.formula(condition))
-            case md.BodyForeach(_, child):
+            case md.BodyForeach(_, child) | md.BodyRetry(_, child):
                 return replace(body, child=self._body(child))
             case md.BodyCall():
                 return body

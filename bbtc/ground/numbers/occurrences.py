@@ -117,6 +117,7 @@ def _both(one: Outcome, other: Outcome) -> Outcome:
         one.reward + other.reward,
         one.cost + other.cost,
         tuple(Charge(when, *amounts) for when, amounts in charges.items()),
+        one.timed_out or other.timed_out,
         (*one.changes, *other.changes),
     )
 

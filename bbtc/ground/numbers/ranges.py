@@ -58,6 +58,8 @@ def with_ranges(model: md.Model, report: Report) -> md.Model:
         for schema in model.schemas.values()
         for each in _doings(schema.effect, tuple(conjuncts(normal_form(schema.precondition))))
     ]
+    # What happens where an action ends early is read in another state than its precondition.
+    doings += [each for schema in model.schemas.values() for each in _doings(schema.on_abort, ())]
     changed = {each.change.function for each in doings}
     read = set(_read(model))
     open_ = {name for name in changed & read if model.functions[name].range is None}
@@ -96,8 +98,9 @@ def _read(model: md.Model) -> Iterator[str]:
     """Functions that conditions, costs, or changes of other numbers read."""
     formulas: list[mf.Formula] = [schema.precondition for schema in model.schemas.values()]
     for schema in model.schemas.values():
-        formulas += me.conditions(schema.effect)
-        for leaf in me.leaves(schema.effect):
+        formulas += me.conditions(schema.effects)
+        formulas += [] if schema.during is None else [schema.during]
+        for leaf in me.leaves(schema.effects):
             if isinstance(leaf, me.Add):
                 yield from (value.function for value in functions(leaf.amount))
             elif isinstance(leaf, me.Change):

@@ -152,7 +152,11 @@ class Atoms:
         for name, row in self.keys:
             args = self.universe.args(row)
             span = spans.get((name, args)) or self.model.predicates[name].span
-            made.append(Variable(name, args, self._unknowable(name, row), digit=digits.get(name), span=span))
+            external = self.model.predicates[name].external
+            unknowable = self._unknowable(name, row)
+            made.append(
+                Variable(name, args, unknowable, digit=digits.get(name), span=span, external=external)
+            )
         return tuple(made)
 
     def _unknowable(self, predicate: str, row: Row) -> bool:

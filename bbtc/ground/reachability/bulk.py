@@ -26,9 +26,11 @@ MOST_SHARED = 200_000
 
 def instances(kind: type[T], size: int, *columns: Iterable[object]) -> list[T]:
     """``size`` instances of a frozen slotted dataclass that has no ``__post_init__``: one column for
-    every field, in order, of that length at least."""
+    every field, in order, of that length at least; the last fields may have none, and get their defaults."""
     made: list[T] = list(map(object.__new__, repeat(kind, size)))
-    for field, column in zip(fields(kind), columns, strict=True):  # type: ignore[arg-type]
+    named = fields(kind)  # type: ignore[arg-type]
+    defaults = [repeat(field.default, size) for field in named[len(columns) :]]
+    for field, column in zip(named, (*columns, *defaults), strict=True):
         deque(map(getattr(kind, field.name).__set__, made, column), maxlen=0)
     return made
 

@@ -69,6 +69,8 @@ class ProgramBuilder:
         self._auxiliary = 0
         self._rules: list[str] = []
         self._called = called(self.model)
+        self._waits = any(schema.exogenous is not None for schema in self.model.schemas.values())
+        """May an action be there to wait for what happens by itself?"""
 
     def build(self) -> Program:
         """All rules and facts."""
@@ -141,7 +143,8 @@ class ProgramBuilder:
         self._bound(block, self._count(parameters))
         precondition = list(conjuncts(normal_form(schema.precondition)))
         found = list(all_groups(block))
-        kept = schema.name in self._called or schema.tells
+        kept = schema.name in self._called or schema.tells or schema.counts
+        kept = kept or (self._waits and schema.exogenous is None)
         if not kept and len(found) == 1 and not found[0].parameters:
             # Nothing happens where the only guard is false: it may as well be a precondition.
             precondition += found[0].guard

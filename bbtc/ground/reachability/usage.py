@@ -38,7 +38,7 @@ class Usage:
     def __init__(self, model: md.Model, start: Start) -> None:
         self.model = model
         self.start = start
-        self.blocks = {name: normalise(schema.effect) for name, schema in model.schemas.items()}
+        self.blocks = {name: normalise(schema.effects) for name, schema in model.schemas.items()}
         self.set_values = md.set_values(model)
         self.derived = {rule.predicate for rule in model.rules}
         self.uncertain = start.uncertain()
@@ -77,7 +77,7 @@ class Usage:
         may leave unknown: any that an effect sets, for all that is known here."""
         formulas = [schema.precondition for schema in self.model.schemas.values()]
         formulas += [
-            guard for schema in self.model.schemas.values() for guard in me.conditions(schema.effect)
+            guard for schema in self.model.schemas.values() for guard in me.conditions(schema.effects)
         ]
         formulas += [
             condition for each in self.model.templates.values() for condition in md.conditions(each.body)
@@ -137,7 +137,7 @@ def items(block: Block, around: tuple[Parameter, ...]) -> Iterator[tuple[Item, t
 def open_predicates(model: md.Model) -> frozenset[str]:
     """Predicates whose facts may change in the world, whatever the model's actions can reach: those that an
     effect mentions, and those declared as external."""
-    mentioned = {leaf.predicate for each in model.schemas.values() for leaf in me.settings(each.effect)}
+    mentioned = {leaf.predicate for each in model.schemas.values() for leaf in me.settings(each.effects)}
     return frozenset(mentioned | {name for name, each in model.predicates.items() if each.external})
 
 

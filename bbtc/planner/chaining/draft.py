@@ -267,7 +267,7 @@ class _Freezer:
         body = self.body(attempt, role, template.body)
         self.calls -= 1
         if isinstance(body, ControlNode) and body.template is None:
-            return ControlNode(body.id, body.kind, body.children, template=template.name)
+            return replace(body, template=template.name)
         # A body of one leaf, or of one call: the template still shows as a node of its own.
         return ControlNode(self.id(attempt.ids, f"{role}.call"), "sequence", (body,), template=template.name)
 
@@ -281,7 +281,8 @@ class _Freezer:
                 for position, child in enumerate(body.children):  # a loop: few frames for each level
                     children.append(self.body(attempt, f"{role}.{position}", child))
                 self.controls -= 1
-                return ControlNode(self.id(attempt.ids, role), body.kind, tuple(children))
+                key = self.id(attempt.ids, role)
+                return ControlNode(key, body.kind, tuple(children), attempts=body.attempts)
             case BodyCondition():
                 node = ConditionNode(self.id(attempt.ids, role), body.condition)
                 self.owners[node.id] = Owner(None, attempt)

@@ -19,7 +19,7 @@ from bbtc.belief.state import initial_belief
 from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.planner.mdp.packing import BitTest, Flags, Packing, Words, bit_test, holds
+from bbtc.planner.mdp.packing import BitTest, Flags, Words, bit_test, every, holds
 from bbtc.planner.mdp.state_space import StateSpace, ranges
 from bbtc.planner.mdp.state_table import StateTable
 from bbtc.planner.mdp.transitions import ActionTables, Index
@@ -62,12 +62,14 @@ class Explorer:
 
     def __init__(self, task: Task, limits: Limits) -> None:
         self.task = task
-        self.packing = Packing.of(task)
-        self.tables = ActionTables(task, self.packing, limits)
-        self._by_reference = np.zeros(len(task.actions), dtype=np.bool_)
+        self.tables = ActionTables(task, limits)
+        self.packing = self.tables.packing
+        self._by_reference = np.zeros(self.tables.count_steps, dtype=np.bool_)
         self._by_reference[list(self.tables.by_reference)] = True
         self.table = StateTable(self.packing.words)
         self._goal_test: BitTest = bit_test(self.packing, task.goal)
+        if self.packing.stage_bits:
+            self._goal_test = every((self.packing.in_stage(0), self._goal_test))
         self._goal = _Column(np.bool_)
         self._tested = 0
         self._in_order = True
@@ -239,8 +241,9 @@ def explore_space(task: Task, limits: Limits, depth: int | None = None) -> State
     explorer = Explorer(task, limits)
     stop: Diagnostic | None = None
     done = steps = 0
+    levels = None if depth is None else depth * explorer.tables.levels
     try:
-        while done < explorer.count and (depth is None or steps < depth):
+        while done < explorer.count and (levels is None or steps < levels):
             level_end = explorer.count
             while done < level_end:
                 done += explorer.expand(np.arange(done, level_end), limits)

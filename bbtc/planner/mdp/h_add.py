@@ -51,7 +51,7 @@ _LEAST_PROBABILITY = 1 / LARGEST
 class Operator(NamedTuple):
     """What an action may bring about under one guard in one of its outcomes: the number of the action in
     the task, the guard (None: always), the outcome's probability, and the values it sets. One with the
-    number -1 only combines facts."""
+    number -1 only combines facts, or is an event."""
 
     action: int
     when: Condition | None
@@ -118,13 +118,21 @@ class Relaxation:
             whole = apparent_factors if not count_actions else seen_factors
             for change in action.changes if count_actions else ():
                 self._add(Operator(-1, None, Fraction(1), ()), cost, needs, [self._told[change.component]])
-            for operator in operators_of(number, whole(task, action)):
-                more = [] if operator.when is None else self._body(operator.when)
-                heads = [3 * variable + int(value) for variable, value in operator.sets]
-                weight = min(dearest, cost / max(_LEAST_PROBABILITY, float(operator.probability)))
-                self._add(operator, weight, [*needs, *more], heads)
+            self._add_all(operators_of(number, whole(task, action)), needs, cost, dearest)
+            # Where it is aborted, events may have ended its precondition.
+            self._add_all(operators_of(number, action.on_abort), needs, cost, dearest)
+        for event in task.events:
+            cost, dearest = (1.0, _DEAREST) if count_actions else (_LEAST_COST, _NEVER)
+            self._add_all(operators_of(-1, event.factors), self._body(event.precondition), cost, dearest)
         self._goal: Index = np.array(self._body(task.goal), dtype=np.int64)
         self._index()
+
+    def _add_all(self, operators: Iterable[Operator], needs: list[int], cost: float, dearest: float) -> None:
+        for operator in operators:
+            more = [] if operator.when is None else self._body(operator.when)
+            heads = [3 * variable + int(value) for variable, value in operator.sets]
+            weight = min(dearest, cost / max(_LEAST_PROBABILITY, float(operator.probability)))
+            self._add(operator, weight, [*needs, *more], heads)
 
     def _tells(self, known: Iterable[Knowledge]) -> int:
         """A fact from which all may follow that can be known."""

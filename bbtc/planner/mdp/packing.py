@@ -45,6 +45,8 @@ class Packing:
     words: int
     beliefs: int = 0
     """Components of hidden facts: the numbers of what is believed of them stand behind the variables."""
+    stage_bits: int = 0
+    """Behind these stands the stage (:mod:`bbtc.planner.mdp.passing`), 0 where something is decided."""
     _three_valued: tuple[int, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -55,8 +57,17 @@ class Packing:
     def _first_belief(self) -> int:
         return len(self.unknown) + len(self._three_valued)
 
+    def in_stage(self, stage: int) -> Cube:
+        """The test for a stage."""
+        at = self._first_belief + BELIEF * self.beliefs
+        return Cube((1 << self.stage_bits) - 1 << at, stage << at)
+
+    def passing(self, states: Words) -> Flags:
+        """In which rows nothing is decided."""
+        return ~holds(self, self.in_stage(0), states)
+
     @classmethod
-    def of(cls, task: Task) -> Packing:
+    def of(cls, task: Task, stage_bits: int = 0) -> Packing:
         """The layout for a task: true bits first, by variable, then the unknown bits."""
         at = len(task.variables)
         beliefs = len(task.components)
@@ -64,7 +75,8 @@ class Packing:
         for variable in task.variables:
             unknown.append(at if variable.three_valued else None)
             at += variable.three_valued
-        return cls(tuple(unknown), max(1, -(-(at + BELIEF * beliefs) // WORD)), beliefs)
+        at += BELIEF * beliefs + stage_bits
+        return cls(tuple(unknown), max(1, -(-at // WORD)), beliefs, stage_bits)
 
     def owner(self, bit: int) -> int:
         """The variable that a bit belongs to."""
@@ -199,9 +211,9 @@ def bit_test(packing: Packing, condition: Condition, value: bool = True) -> BitT
         case Within():
             return bit_test(packing, in_digits(condition), value)
         case And(parts) if value:
-            return _all(bit_test(packing, part, True) for part in parts)
+            return every(bit_test(packing, part, True) for part in parts)
         case Or(parts) if not value:
-            return _all(bit_test(packing, part, False) for part in parts)
+            return every(bit_test(packing, part, False) for part in parts)
         case And(parts) | Or(parts):
             return _any([bit_test(packing, part, value) for part in parts])
         case Not(part):
@@ -219,7 +231,8 @@ def _is_unknown(packing: Packing, variable: int, value: bool) -> BitTest:
     return Cube(1 << at, 1 << at if value else 0)
 
 
-def _all(parts: Iterable[BitTest]) -> BitTest:
+def every(parts: Iterable[BitTest]) -> BitTest:
+    """That all of some tests hold."""
     mask = bits = 0
     rest: list[BitTest] = []
     for part in parts:
@@ -262,7 +275,7 @@ def cubes(test: BitTest, most: int) -> list[Cube] | None:
                 inner = cubes(part, most)
                 if inner is None:
                     return None
-                joined = [_all((a, b)) for a in product for b in inner]
+                joined = [every((a, b)) for a in product for b in inner]
                 product = list(dict.fromkeys(cube for cube in joined if isinstance(cube, Cube)))
                 if len(product) > most:
                     return None

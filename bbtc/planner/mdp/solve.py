@@ -13,6 +13,7 @@ from bbtc.diagnostics import Diagnostic, LimitReached
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.mdp.bounded_search import Advice, search_bounds
+from bbtc.planner.mdp.contraction import contracted
 from bbtc.planner.mdp.explore import explore_space
 from bbtc.planner.mdp.finite_horizon import Horizon, horizon_values
 from bbtc.planner.mdp.fully_observable import fully_observable
@@ -196,7 +197,7 @@ class BestWithin:
 def best_within(task: Task, limits: Limits, max_actions: int) -> BestWithin:
     """Bounds on the best probability with at most so many actions. Raises ``LimitReached`` if the
     time is over before anything was found."""
-    space = explore_space(task, limits.part(_BEFORE_VALUES), max_actions)
+    space = contracted(explore_space(task, limits.part(_BEFORE_VALUES), max_actions), limits)
     horizon = horizon_values(space, max_actions, limits)
     if space.stop is None:
         return BestWithin(horizon, horizon.initial[-1], None)

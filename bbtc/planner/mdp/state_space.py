@@ -61,6 +61,11 @@ class Branching:
         first = self._edge_first[choices]
         return ranges(first, self._edge_first[choices + 1] - first)
 
+    def edge_counts(self, choices: Index | Number) -> Index:
+        """How many edges each of some choices has."""
+        found: Index = self._edge_first[choices + 1] - self._edge_first[choices]
+        return found
+
     def having(self, choices: Flags | None = None) -> Flags:
         """The states that have any of some choices (by default: any at all)."""
         found = np.zeros(len(self.goal), dtype=np.bool_)
@@ -117,6 +122,17 @@ class StateSpace(Branching):
     draws: tuple[Draw, ...]
     initial: tuple[tuple[Fraction, int], ...]
     stop: Diagnostic | None
+
+    @property
+    def passing(self) -> Flags:
+        """The states in which nothing is decided (:mod:`bbtc.planner.mdp.passing`)."""
+        return self.packing.passing(self.states)
+
+    @property
+    def decided(self) -> Flags:
+        """The choices that are actions."""
+        found: Flags = self.choice_action < len(self.task.actions)
+        return found
 
     @property
     def expanded(self) -> int:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from bbtc.belief.draws import Values
 from bbtc.belief.state import Transition, compile_action
 from bbtc.ground.condition import Condition
-from bbtc.ground.task import Charge, Effect, Factor, Task
+from bbtc.ground.task import NO_CHANGE, ZERO, Charge, Effect, Factor, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import (
@@ -25,9 +25,11 @@ from bbtc.planner.mdp.packing import (
     Words,
     bit_test,
     cubes,
+    every,
     holds,
     set_bits,
 )
+from bbtc.planner.mdp.passing import Passing, Step
 
 Index: TypeAlias = npt.NDArray[np.int64]
 
@@ -79,12 +81,12 @@ class _Masks:
 
 @dataclass(slots=True)
 class ActionTables:
-    """All actions. ``draws`` grows when actions with very many outcomes, or with costs or rewards under
-    conditions, are expanded."""
+    """All actions, and behind them the steps of stages. ``draws`` grows when actions with very many outcomes,
+    or with costs or rewards under conditions, are expanded."""
 
     task: Task
-    packing: Packing
     limits: Limits
+    packing: Packing = field(init=False)
     draws: list[Draw] = field(default_factory=list)
 
     # Applicability: rows of cubes, ordered by action; other preconditions one by one.
@@ -109,19 +111,55 @@ class ActionTables:
     guard_masks: tuple[Words, Words, Words, Words] = field(init=False)
     by_reference: dict[int, Transition] = field(init=False, default_factory=dict)
     """Actions with too many joint outcomes, or that change what is believed, as the simulator runs them."""
+    levels: int = field(init=False, default=1)
+    """So many steps lead from one decision to the next, at most."""
+    _steps: tuple[Step, ...] = field(init=False)
+    _whole: bool = field(init=False)
+    """Are there events, but no stages?"""
     _charges: dict[int, tuple[tuple[BitTest, Charge], ...]] = field(init=False, default_factory=dict)
     """By outcome: what it adds to cost and reward under conditions."""
     _draw_index: dict[tuple[tuple[int, int], ...], int] = field(init=False, default_factory=dict)
     """By the figures as ratios, whose hashes take little time."""
 
+    @property
+    def count_steps(self) -> int:
+        """How many actions there are, and steps of stages behind them."""
+        return len(self._steps)
+
     def __post_init__(self) -> None:
+        passing = Passing.of(self.task)
+        if passing is None or not self._compile(passing):
+            self.draws.clear()
+            self._charges.clear()
+            self.general.clear()
+            self._compile(None)
+
+    def _compile(self, passing: Passing | None) -> bool:
+        """Fill the tables; without stages, actions are run with the events by the simulator. False where a
+        step of a stage has too many outcomes."""
+        self._whole = passing is None
+        stages = passing or Passing.none(self.task)
+        actions = [
+            Step(
+                0,
+                action.precondition,
+                (NO_CHANGE,) if number in stages.interrupted else action.factors,
+                after,
+            )
+            for number, (action, after) in enumerate(zip(self.task.actions, stages.after, strict=True))
+        ]
+        self._steps = (*actions, *stages.steps)
+        self.packing = Packing.of(self.task, stages.bits)
+        self.levels = stages.levels
         self._compile_preconditions()
-        self._compile_outcomes()
+        return self._compile_outcomes()
 
     def _compile_preconditions(self) -> None:
         rows: list[tuple[int, Cube]] = []
-        for number, action in enumerate(self.task.actions):
-            test = bit_test(self.packing, action.precondition)
+        for number, step in enumerate(self._steps):
+            test = bit_test(self.packing, step.precondition)
+            if self.packing.stage_bits:
+                test = every((self.packing.in_stage(step.stage), test))
             found = cubes(test, MOST_CUBES)
             if found is None:
                 self.general.append((number, test))
@@ -143,26 +181,33 @@ class ActionTables:
         self._literal = np.array(literals, dtype=np.int64)
         self._literal_first = np.array(firsts, dtype=np.int64)
 
-    def _compile_outcomes(self) -> None:
+    def _compile_outcomes(self) -> bool:
         base: list[_Masks] = []
         guards: list[list[tuple[Cube, _Masks]]] = []
         first, count = [], []
-        for number, action in enumerate(self.task.actions):
+        for number, step in enumerate(self._steps):
+            action = self.task.actions[number] if number < len(self.task.actions) else None
             first.append(len(base))
-            joint = None if action.changes else _joint(action.factors)
+            joint = None if action and (action.changes or self._whole) else _joint(step.factors)
             rows = None if joint is None else [self._outcome(effects) for effects, *_ in joint]
             if joint is None or rows is None or any(row is None for row in rows):
+                if action is None:
+                    return False
                 self.by_reference[number] = compile_action(self.task, action, self.limits)
                 count.append(0)
                 continue
+            stage = self.packing.in_stage(step.after)
+            own = ZERO if action is None else action.cost
             for row, ((_, cost, reward, charges), probability) in zip(rows, joint.items(), strict=True):
                 assert row is not None
                 if charges:
                     tests = tuple((bit_test(self.packing, charge.when), charge) for charge in charges)
                     self._charges[len(base)] = tests
+                row[0].clear |= stage.mask
+                row[0].true |= stage.value
                 base.append(row[0])
                 guards.append(row[1])
-                self.draws.append(Draw(probability, action.cost + cost, reward))
+                self.draws.append(Draw(probability, own + cost, reward))
             count.append(len(rows))
         self.first = np.array(first, dtype=np.int64)
         self.count = np.array(count, dtype=np.int64)
@@ -173,6 +218,7 @@ class ActionTables:
         self.guard_mask = self.packing.split(cube.mask for rows in guards for cube, _ in rows)
         self.guard_value = self.packing.split(cube.value for rows in guards for cube, _ in rows)
         self.guard_masks = self._columns([masks for rows in guards for _, masks in rows])
+        return True
 
     def _columns(self, rows: list[_Masks]) -> tuple[Words, Words, Words, Words]:
         split = self.packing.split
@@ -252,7 +298,7 @@ class ActionTables:
             found = np.flatnonzero(holds(self.packing, test, states))
             pieces_rows.append(found)
             pieces_actions.append(np.full(len(found), number, dtype=np.int64))
-        total = len(self.task.actions)
+        total = len(self._steps)
         keys = np.unique(np.concatenate(pieces_rows) * total + np.concatenate(pieces_actions))
         return keys // total, keys % total
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc.limits import Limits
+from bbtc.planner.mdp.contraction import onward_pairs
 from bbtc.planner.mdp.maxprob import MaxProb
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.ssp import LeastCost, least_cost
@@ -47,7 +48,8 @@ def best_multi_policy(found: MaxProb, limits: Limits) -> tuple[MultiPolicy, Leas
     cheapest = least_cost(found, limits)
     if cheapest is not None:
         policy, best = cheapest.policy, cheapest.best
-        if any(found.space.draws[draw].cost == 0 for draw in np.unique(found.space.edge_draw)):
+        decided = found.space.decided[found.space.edge_choice]
+        if any(found.space.draws[draw].cost == 0 for draw in np.unique(found.space.edge_draw[decided])):
             # Among equally cheap choices, cycles without cost must not be offered.
             narrowed = replace(found, policy=policy, best=best)
             policy, best = _fewest_actions(narrowed, limits)
@@ -130,22 +132,24 @@ def _fewest_actions(found: MaxProb, limits: Limits) -> tuple[Number, Flags]:
 def multi_policy(
     space: StateSpace, taken: Flags, entry: Index | None = None, inside: Flags | None = None
 ) -> MultiPolicy:
-    """The part of a space that a run may visit if it takes only choices of ``taken``, from the initial
+    """The decisions of a space that a run may come to if it takes only choices of ``taken``, from the initial
     states or from ``entry``; where ``inside`` is given, nothing starts outside of it."""
     start = space.start if entry is None else entry
     if inside is not None:
         taken = taken & inside[space.choice_state]
-    states = space.closure(start, taken)
+    passing = space.passing
+    states = space.closure(start, taken | ~space.decided)
+    states = states[~passing[states]]
     choices = space.choices_of(states)
     choices = choices[taken[choices]]
-    edges = space.edges_of(choices)
-    number, choice_number = _numbers(states, len(space.goal)), _numbers(choices, len(taken))
+    owner, successor = onward_pairs(space, passing, choices)
+    number = _numbers(states, len(space.goal))
     return MultiPolicy(
         goal=space.goal[states],
         choice_state=number[space.choice_state[choices]],
         choice_action=space.choice_action[choices],
-        edge_choice=choice_number[space.edge_choice[edges]],
-        edge_successor=number[space.edge_successor[edges]],
+        edge_choice=owner.astype(np.int32),
+        edge_successor=number[successor],
         values=space.packing.unpack(space.states[states]),
         idle=np.zeros(len(states), dtype=np.bool_) if inside is None else ~inside[states],
         initial=number[start].astype(np.int64),

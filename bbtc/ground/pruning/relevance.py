@@ -1,6 +1,6 @@
 """Which actions and variables can matter to the goal, found before any action is made.
 
-This is the backward relevance of :mod:`bbtc.ground.prune` on argument rows, for tasks without
+This is the backward relevance of :mod:`bbtc.ground.pruning.prune` on argument rows, for tasks without
 templates: a task with a million actions is then made once, with what matters only. It shares no code with
 that, which needs a node for each action: here there are arrays of rows, looked at thousands at a time.
 """
@@ -34,6 +34,7 @@ class _Rows:
 
     def __init__(self, lowering: Lowering, schema: md.Schema, rows: list[Row]) -> None:
         self.rows = self.left = rows
+        self.happens = schema.exogenous is not None
         block = lowering.atoms.reach.usage.blocks[schema.name]
         used, frame = projection(lowering.universe, schema.parameters, reads(block))
         self.key = picker(used)
@@ -41,8 +42,8 @@ class _Rows:
         self._effect = EffectLowering(lowering, Report()).effect(block, frame, None)
         self._env = frame.env
         self._keys: dict[Row, None] = {}
-        self.guarded = next(me.conditions(schema.effect), None) is not None
-        leaves = list(me.leaves(schema.effect))
+        self.guarded = next(me.conditions(schema.effects), None) is not None
+        leaves = list(me.leaves(schema.effects))
         self._charges = (self.guarded and any(isinstance(leaf, me.Add) for leaf in leaves)) or any(
             isinstance(leaf, me.Change) or (isinstance(leaf, me.Add) and reads_number(lowering, leaf))
             for leaf in leaves
@@ -129,12 +130,17 @@ class Relevance:
             _Rows(lowering, schema, each) for schema, each in zip(model.schemas.values(), rows, strict=True)
         ]
         self.read = set(variables(goal))
-        if model.metric == "reward":
-            for schema, each in zip(model.schemas.values(), self._schemas, strict=True):
-                if me.earns(schema.effect):
-                    self._keep(each, each.rows)
-                    each.left = []
+        for schema, each in zip(model.schemas.values(), self._schemas, strict=True):
+            if schema.counts or (model.metric == "reward" and me.earns(schema.effects)):
+                self._keep(each, each.rows)
+                each.left = []
         self._close()
+        if any(each.happens and len(each.left) < len(each.rows) for each in self._schemas):
+            # An action that does nothing else may be there to wait for it.
+            for rows_ in (each for each in self._schemas if not each.happens):
+                self._keep(rows_, rows_.left)
+                rows_.left = []
+            self._close()
 
     def rows(self) -> list[list[Row]]:
         """The rows that matter, in their order. The others are given up."""

@@ -1,0 +1,1 @@
+"""What cannot matter to the goal is left out of a task."""

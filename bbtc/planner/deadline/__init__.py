@@ -1,0 +1,1 @@
+"""Planning for success by a deadline: backward induction over steps of time."""
