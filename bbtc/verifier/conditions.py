@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from typing_extensions import assert_never
 
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
 from bbtc.kleene import Truth
 from bbtc.verifier.program import Compare, Expression, Literally, all_of, any_of, none_of
 
@@ -37,6 +37,8 @@ def _where(condition: Condition, cell_of: Mapping[int, int], value: bool) -> Exp
             return none_of(unknown) if value else unknown
         case Is(variable, wanted):
             return Compare(cell_of[variable], "=", TRUE if (wanted is Truth.TRUE) == value else FALSE)
+        case Within():
+            return _where(in_digits(condition), cell_of, value)
         case And(parts) | Or(parts):
             each = (_where(part, cell_of, value) for part in parts)
             return all_of(*each) if isinstance(condition, And) == value else any_of(*each)
