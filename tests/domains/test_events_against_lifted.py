@@ -121,7 +121,7 @@ def _compare_tree(text: str, lifted: Lifted, task: Task, strategy: str, best: fl
     return "tree"
 
 
-@pytest.mark.parametrize("group", range(amount(2, 60)))
+@pytest.mark.parametrize("group", range(amount(1, 60)))
 def test_random_texts_with_events_have_the_values_that_their_words_give_them(group: int) -> None:
     """Best probability, within budgets too, least cost, and the runs of a tree; JSON and layout keep them."""
     done = Counter(compare(seed) for seed in range(group * _GROUP, (group + 1) * _GROUP))
