@@ -162,6 +162,8 @@ def _success_by(
 def _spread(duration: Duration, at_most: Fraction | None, step: Fraction, *, late: bool) -> list[float]:
     """How probably the duration takes 0, 1, 2, … steps, rounded up, or down."""
     sure = 1.0 if at_most is None else _until(duration, at_most, inclusive=True)
+    if not sure:
+        return []  # it is always given up
     before, found = 0.0, list[float]()
     for number in range(_STEPS + 1):
         end = step * number if late else step * (number + 1)
