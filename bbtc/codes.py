@@ -158,6 +158,7 @@ _CODES = (
     Code("BBT0447", "deadline that no run can meet"),
     Code("BBT0448", "body that tries again for ever"),
     Code("BBT0449", "durative action that takes concurrency"),
+    Code("BBT0450", "time limit on a part of a body"),
     Code("BBT0451", "events that contradict each other"),
     Code("BBT0452", "event that cannot be grounded yet"),
     # 05xx: planning

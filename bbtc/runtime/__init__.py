@@ -4,6 +4,7 @@ runtime=imported``, they import it from here. It needs py_trees (2.2 or later) a
 from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
+from bbtc.runtime.limits import Within, within
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
 from bbtc.runtime.moving import MovingWorld, Rounds, Test
 from bbtc.runtime.nodes import (
@@ -72,6 +73,7 @@ __all__ = [
     "When",
     "WithBeliefs",
     "WithSetup",
+    "Within",
     "World",
     "all_of",
     "any_of",
@@ -89,4 +91,5 @@ __all__ = [
     "skipper",
     "until_success",
     "watched",
+    "within",
 ]

@@ -514,6 +514,11 @@ class Builder(Expressions):
     def body_retry(self, head: Token, number: Token, child: ast.Body, close: Token) -> ast.BodyRetry:
         return ast.BodyRetry(self.number(number), child, head.to(close))
 
+    def body_timeout(self, head: Token, _number: Token, _child: ast.Body, close: Token) -> ast.Body:
+        message = "a time limit on a part of a body is not supported"
+        hint = "give the action one: `:timeout`, which every tree keeps"
+        raise Misuse("BBT0450", message, head.to(close), hint)
+
     def body_condition(self, head: Token, formula: ast.Formula, close: Token) -> ast.BodyCondition:
         return ast.BodyCondition(formula, head.to(close))
 

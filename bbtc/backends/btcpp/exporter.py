@@ -264,7 +264,7 @@ class _Writer:
         guard = guard_of(self.task, node)
         forgets = node.latched and bool(place.forget)  # our node Latch never does
         if self.profile == "bbtc" and not forgets:
-            tag = self._leaf(action, place.binding)
+            tag = self._limited(self._leaf(action, place.binding), action)
             needed = self._start_conditions(guard, place.binding, place.counters)
             element = self.idioms.latch(tag, needed, node.latched)
             element.set("name", label)
@@ -295,6 +295,7 @@ class _Writer:
         tag = Element(self.names.ids[action_symbol(action)])
         for port, arg in self._ports(action):
             tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
+        tag = self._limited(tag, action)
         binding = {arg: port for port, arg in reversed(passed.items())}
         needed = self._start_conditions(guard, binding, counters)
         title = self.names.plain[action_symbol(action)]
@@ -323,6 +324,9 @@ class _Writer:
         for port, arg in self._ports(action):
             element.set(port, self.conditions.value(arg, binding))
         return element
+
+    def _limited(self, leaf: Element, action: GroundAction) -> Element:
+        return leaf if action.timeout is None else self.idioms.given_up(leaf, action.timeout)
 
     def _ports(self, action: GroundAction) -> list[tuple[str, str]]:
         parameters = self.names.interface.leaves[action_symbol(action)].parameters

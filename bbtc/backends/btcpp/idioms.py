@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Literal, TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
@@ -22,6 +23,7 @@ SKIPPER, LATCH = "Skipper", "Latch"
 """Ids of our own control nodes."""
 
 UNTIL_SUCCESS = "RetryUntilSuccessful"
+TIMEOUT = "Timeout"
 
 SKIPPER_LABEL = "skipper"
 """The name that a Parallel gets where the Skipper has none."""
@@ -176,6 +178,12 @@ class Idioms:
         keep = decorated("KeepRunningUntilFailure", decorated("ForceSuccess", action))
         return self.control("sequence", [Element("Script", code=script), keep])
 
+    def given_up(self, leaf: Element, seconds: Fraction) -> Element:
+        """The action, which has ended when it is given up after so many seconds, as it has when it fails."""
+        limit = decorated(TIMEOUT, leaf)
+        limit.set("msec", str(milliseconds(seconds)))
+        return decorated("ForceSuccess", limit)
+
     # --- tests and registers -----------------------------------------------------------------
 
     def test(self, kind: Literal["known", "unknown"], leaf: Element) -> Element:
@@ -194,6 +202,11 @@ class Idioms:
         answer = Element("Precondition", {"if": "_value != 'unknown'", "else": "RUNNING"})
         SubElement(answer, "ScriptCondition", code="_value == 'true'")
         return self.control("sequence", [read, answer])
+
+
+def milliseconds(seconds: Fraction) -> int:
+    """The next whole number of them."""
+    return -int(-seconds * 1000 // 1)
 
 
 def attempt_ends(state: str, forget: Sequence[str]) -> dict[str, str]:

@@ -107,7 +107,8 @@ class _Writer:
         used |= used_in(line for block in [*trees, *tables, main] for line in block)
         if self.embedded:
             used = needed(used)
-            nodes, world, head = copied("nodes", used), copied("world", used), imports(used)
+            nodes = [*copied("nodes", used), *copied("limits", used)]
+            world, head = copied("world", used), imports(used)
             world += [*copied("monitor", used), *copied("moving", used), *copied("numbers", used)]
         else:
             nodes, world, head = [], [], imports(used, ("bbtc.runtime", defined(used)))
@@ -193,6 +194,9 @@ class _Writer:
         if self.monitor is not None and node.action in self.monitor.readings:
             told = words_tuple((action.schema, *action.args))
             items = [name, Prefixed("*", call("watched", "robot", told, act))]
+        elif action.timeout is not None:
+            seconds = repr(float(action.timeout))
+            items = [Prefixed("*", call("within", seconds, name, act, "robot.cancel"))]
         guard = guard_of(self.task, node)
         if guard is not None:
             items.append(Prefixed("guard=", self._test(guard)))

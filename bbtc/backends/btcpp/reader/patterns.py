@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, UNTIL_SUCCESS
+from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, TIMEOUT, UNTIL_SUCCESS
 from bbtc.backends.btcpp.reader.xmltext import XmlElement
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
@@ -209,6 +209,19 @@ UNTIL_BLOCKED = Shape(
     ),
 )
 """The tree, and FAILURE where it is running and no action is."""
+
+GIVEN_UP = Shape(
+    "ForceSuccess",
+    {},
+    (
+        Shape(
+            TIMEOUT,
+            {"msec": Pattern(re.compile("(?P<msec>[0-9]{1,13})"), "30000")},
+            (Hole("leaf"),),
+        ),
+    ),
+)
+"""An action that is given up after some time, which counts as its end."""
 
 RETRY = Shape(
     "ReactiveSequence",
