@@ -77,8 +77,9 @@ class Writer:
             else:
                 effect = f"({self.draw.choice(('increase', 'decrease'))} {target} {self.draw.randint(1, 3)})"
             p = self.draw.choice(("0.5", "1/3", "1"))
+            condition = self.condition(1)
             made.append(
-                f"(:exogenous e{number} :precondition {self.condition(1)} :effect (probabilistic {p} {effect}))"
+                f"(:exogenous e{number} :precondition {condition} :effect (probabilistic {p} {effect}))"
             )
         return made
 
