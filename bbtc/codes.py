@@ -157,6 +157,7 @@ _CODES = (
     Code("BBT0446", "time that is not known"),
     Code("BBT0447", "deadline that no run can meet"),
     Code("BBT0448", "body that tries again for ever"),
+    Code("BBT0449", "durative action that takes concurrency"),
     Code("BBT0451", "events that contradict each other"),
     Code("BBT0452", "event that cannot be grounded yet"),
     # 05xx: planning

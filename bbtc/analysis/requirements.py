@@ -140,7 +140,10 @@ def _in_domain(model: md.Model) -> Iterator[_Use]:
     yield from ((":derived-predicates", rule.span) for rule in model.rules)
     declared = (each for each in model.predicates.values() if each.name not in model.thresholds)
     yield from ((":unknown", each.span) for each in declared if each.declared_three_valued)
-    for function in model.functions.values():
+    timing = {
+        name for each in model.schemas.values() for name in me.functions_timing(each.duration, each.timeout)
+    }
+    for function in (each for each in model.functions.values() if each.name not in timing):
         if function.range is not None or md.number_predicate(function.name) in model.predicates:
             yield ":numeric-fluents", function.span
             continue

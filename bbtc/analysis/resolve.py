@@ -10,6 +10,7 @@ from typing_extensions import assert_never
 
 from bbtc.analysis import bodies, exogenous, facts, formulas, po_pddl, replanner, truth_words
 from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections, weighted
+from bbtc.analysis.durative import with_sequential
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
 from bbtc.analysis.timing import timed
@@ -54,6 +55,7 @@ def resolve(
     sum differs from 1 by at most 1e-9 are taken as rounded and divided by their sum; a smaller sum
     gets an explicit no-change branch.
     """
+    domain = with_sequential(domain, problem, report)
     definitions = (domain,) if problem is None else (domain, problem)
     names = Names(report, definitions=definitions, lenient=lenient)
     _check_sections(report, domain, problem)

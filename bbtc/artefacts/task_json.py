@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
-from typing_extensions import assert_never
-
 from bbtc.artefacts import numbers_json
+from bbtc.artefacts.bodies_json import body_to_json
 from bbtc.artefacts.conditions import condition_to_json, number_of
 from bbtc.artefacts.cursor import At, Faults, check_distinct, clip, optional, run_reader
 from bbtc.artefacts.duration_json import (
@@ -165,7 +164,8 @@ def _event_to_json(event: GroundEvent, variables: Sequence[Variable]) -> Json:
         "precondition": condition_to_json(event.precondition, variables),
         **_chance_to_json(event.factors, variables),
     }
-    return value | ({"round": event.round} if event.round else {})
+    value |= {"round": event.round} if event.round else {}
+    return value | ({"per": event.rate} if event.rate != "action" else {})
 
 
 def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
@@ -231,24 +231,8 @@ def _template_to_json(template: GroundTemplate, variables: Sequence[Variable]) -
         "args": list(template.args),
         "precondition": condition_to_json(template.precondition, variables),
         **_chance_to_json(template.factors, variables),
-        "body": _body_to_json(template.body, variables),
+        "body": body_to_json(template.body, variables),
     }
-
-
-def _body_to_json(body: Body, variables: Sequence[Variable]) -> Json:
-    match body:
-        case BodyControl(kind, children, attempts):
-            counted = {} if attempts is None else {"attempts": attempts}
-            inner = [_body_to_json(child, variables) for child in children]
-            return {"type": kind, **counted, "children": inner}
-        case BodyCondition(condition):
-            return {"type": "condition", "condition": condition_to_json(condition, variables)}
-        case BodyAction(action):
-            return {"type": "action", "action": action}
-        case BodyTemplate(template):
-            return {"type": "template", "template": template}
-        case _:
-            assert_never(body)
 
 
 # --- in --------------------------------------------------------------------------------------
@@ -468,7 +452,7 @@ class _Reader(HiddenReader):
 
     def event(self, at: At) -> GroundEvent:
         members = at.members(
-            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round"]
+            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round", "per"]
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -476,7 +460,14 @@ class _Reader(HiddenReader):
         if isinstance(number, bool) or not isinstance(number, int) or number < 0:
             raise members["round"].fault("BBT0604", "must be the number of a round, from 0 on")
         factors = self.chance(at, members)
-        return GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        event = GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        if "per" not in members or members["per"].word("action", "second") == "action":
+            return event
+        if any(sum(each.does_something for each in factor.outcomes) > 1 for factor in factors):
+            raise members["per"].fault(
+                "BBT0604", "one outcome of each factor at most does something each second"
+            )
+        return replace(event, rate="second")
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
         """The factors of an object with either ``outcomes`` or ``factors``."""

@@ -6,93 +6,25 @@ and costs are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
-from bbtc.durations import Duration
+from bbtc.durations import INSTANT, Duration, meanwhile
 from bbtc.ground.condition import Condition
+from bbtc.ground.variables import Digit as Digit
+from bbtc.ground.variables import NumberVariable as NumberVariable
+from bbtc.ground.variables import Variable as Variable
+from bbtc.ground.variables import digit_name as digit_name
+from bbtc.ground.variables import ground_name as ground_name
+from bbtc.ground.variables import numbers_of as numbers_of
+from bbtc.ground.variables import split_name as split_name
+from bbtc.ground.variables import unused_name as unused_name
 from bbtc.kleene import Truth
 from bbtc.source import Span
-
-
-def ground_name(symbol: str, args: tuple[str, ...]) -> str:
-    """``symbol(arg,…)``: the name of a ground predicate, action or template."""
-    return f"{symbol}({','.join(args)})"
-
-
-def split_name(name: str) -> tuple[str, tuple[str, ...]]:
-    """Symbol and arguments of a ground name, as far as the name alone tells: what it says of one
-    that :func:`ground_name` made of words with commas or brackets in them need not be right."""
-    symbol, _, rest = name.partition("(")
-    inner = rest.removesuffix(")")
-    return symbol, tuple(inner.split(",")) if inner else ()
-
-
-def unused_name(name: str, taken: Collection[str]) -> str:
-    """The name, made longer if it is taken."""
-    while name in taken:
-        name += "-"
-    return name
-
-
-@dataclass(frozen=True, slots=True)
-class Digit:
-    """Which binary digit of which number a variable is: that of the value 2 to the ``place``, counted from
-    ``low``, the least value of ``function`` for the variable's arguments."""
-
-    function: str
-    place: int
-    low: int
-    high: int
-    blocks: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class NumberVariable:
-    """A whole number from ``low`` to ``high``, kept in ``digits``: two-valued variables, the least first,
-    which count from ``low``. Actions that may leave the range do not start where it ``blocks``; else it
-    stays at its bounds."""
-
-    function: str
-    args: tuple[str, ...]
-    low: int
-    high: int
-    blocks: bool
-    digits: tuple[int, ...]
-
-    @property
-    def name(self) -> str:
-        """``function(arg,…)``."""
-        return ground_name(self.function, self.args)
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
-    others change it, of whom the task knows nothing. Of a number it is a ``digit``, which is true where it
-    is 1."""
-
-    predicate: str
-    args: tuple[str, ...]
-    three_valued: bool
-    hidden: bool = False
-    digit: Digit | None = None
-    span: Span | None = field(default=None, compare=False, repr=False)
-    external: bool = False
-
-    @property
-    def name(self) -> str:
-        """``predicate(arg,…)``."""
-        return ground_name(self.predicate, self.args)
-
-    @property
-    def values(self) -> tuple[Truth, ...]:
-        """The values it can take."""
-        return (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN) if self.three_valued else (Truth.TRUE, Truth.FALSE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +83,11 @@ class Outcome:
     timed_out: bool = False
     """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
     changes: tuple[NumberChange, ...] = ()
+
+    @property
+    def does_something(self) -> bool:
+        """Does it set or add anything, or draw further?"""
+        return bool(self.effects or self.factors or self.reward or self.cost or self.charges)
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,7 +230,9 @@ class GroundAction:
 
 @dataclass(frozen=True, slots=True)
 class GroundEvent:
-    """What happens by itself, once an action: where the precondition is true, one outcome of every factor.
+    """What happens by itself, once an action: where the precondition is true, one outcome of every factor. By
+    the ``rate`` of a second, each factor draws the one outcome that does something, at most once, with its
+    probability for every second that the action takes (:func:`bbtc.durations.meanwhile`).
 
     The events of one ``round`` happen at once: all read the state that the action left, or the round before,
     and no two of them set a variable to different values."""
@@ -304,11 +243,18 @@ class GroundEvent:
     factors: tuple[Factor, ...]
     round: int = 0
     span: Span | None = field(default=None, compare=False, repr=False)
+    rate: Literal["action", "second"] = "action"
 
     @property
     def name(self) -> str:
         """``schema(arg,…)``."""
         return ground_name(self.schema, self.args)
+
+    def during(self, action: GroundAction) -> GroundEvent:
+        """The event as it happens with an action."""
+        if self.rate == "action":
+            return self
+        return replace(self, factors=tuple(_over_time(each, action) for each in self.factors), rate="action")
 
     @property
     def possible_factors(self) -> tuple[Factor, ...]:
@@ -462,12 +408,22 @@ class Task:
         return (*self.actions, *self.events)
 
     @cached_property
-    def rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
-        """The events by round, in order."""
+    def _rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
         found: dict[int, list[GroundEvent]] = {}
         for event in self.events:
             found.setdefault(event.round, []).append(event)
         return tuple(tuple(found[number]) for number in sorted(found))
+
+    @property
+    def moves_by_time(self) -> bool:
+        """Are there events that are the more probable, the longer an action takes?"""
+        return any(event.rate == "second" for event in self.events)
+
+    def rounds(self, action: GroundAction) -> tuple[tuple[GroundEvent, ...], ...]:
+        """The events that happen with an action by round, in order."""
+        if not self.moves_by_time:
+            return self._rounds
+        return tuple(tuple(event.during(action) for event in events) for events in self._rounds)
 
     @cached_property
     def endless_beliefs(self) -> bool:
@@ -491,36 +447,21 @@ class Task:
         return {template.name: template for template in self.templates}
 
 
-def numbers_of(variables: Sequence[Variable]) -> tuple[NumberVariable, ...]:
-    """The numbers that some variables are the digits of, in the order of their first digits."""
-    found: dict[tuple[str, tuple[str, ...]], list[int]] = {}
-    for index, variable in enumerate(variables):
-        if variable.digit is not None:
-            found.setdefault((variable.digit.function, variable.args), []).append(index)
-    made = []
-    for (function, args), indices in found.items():
-        placed = sorted((digit.place, index, digit) for index, digit in _digits(variables, indices))
-        _, _, digit = placed[0]
-        digits = tuple(index for _, index, _ in placed)
-        made.append(NumberVariable(function, args, digit.low, digit.high, digit.blocks, digits))
-    return tuple(made)
-
-
-def digit_name(function: str, place: int) -> str:
-    """The predicate of a digit of the numbers of a function; no file can name it."""
-    return f"{function} digit {place}"
-
-
-def _digits(variables: Sequence[Variable], indices: Iterable[int]) -> Iterator[tuple[int, Digit]]:
-    for index in indices:
-        digit = variables[index].digit
-        if digit is not None:
-            yield index, digit
-
-
 ZERO = Fraction(0)
 ONE = Fraction(1)
 NO_CHANGE = Factor((Outcome(ONE, ()),))
+
+
+def _over_time(factor: Factor, action: GroundAction) -> Factor:
+    """A factor that is drawn every second until something happens, while an action goes on."""
+    happens = [each for each in factor.outcomes if each.does_something]
+    chance = sum((each.probability for each in happens), ZERO)
+    if not chance:
+        return factor
+    total = meanwhile(chance, INSTANT if action.duration is None else action.duration, action.timeout)
+    scaled = [replace(each, probability=each.probability * total / chance) for each in happens]
+    rest = () if total == 1 else (Outcome(1 - total, ()),)
+    return replace(factor, outcomes=(*(each for each in scaled if each.probability), *rest))
 
 
 def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from itertools import compress, repeat
@@ -10,8 +10,8 @@ from operator import itemgetter
 
 from typing_extensions import assert_never
 
-from bbtc.diagnostics import Report
-from bbtc.durations import Duration
+from bbtc.diagnostics import Diagnostic, Report
+from bbtc.durations import Duration, LogNormal
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
 from bbtc.ground.effects import EffectLowering, LoweredDuration, LoweredEffect, LoweredTimeOut, arrange
@@ -20,12 +20,12 @@ from bbtc.ground.goal import unreachable
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend, projection
 from bbtc.ground.normal import conjuncts, normalise, timing_terms
 from bbtc.ground.numbers.digits import digits_of, is_digit
+from bbtc.ground.pruning.renumber import reordered
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.reachability.bulk import Shared, consumed, instances
 from bbtc.ground.reachability.reach import Reach, reach
 from bbtc.ground.reachability.usage import called
 from bbtc.ground.refused import refused
-from bbtc.ground.renumber import reordered
 from bbtc.ground.start import Beginning, beginning
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
@@ -121,7 +121,7 @@ class TaskBuilder:
         # The last of them, since conditions ask for variables.
         variables = self.atoms.variables(digits_of(model))
         initial = self._initial(variables)
-        for finding in clashes(events, variables, limits):
+        for finding in (*clashes(events, variables, limits), *self._unknown_rates(events, actions)):
             report.add(finding)
         report.raise_errors()
         if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
@@ -241,6 +241,7 @@ class TaskBuilder:
     def _events(self) -> tuple[gt.GroundEvent, ...]:
         """Every event that can ever happen, by round and name."""
         rounds = md.rounds_of(self.model)
+        rates = {each.name: each.exogenous.per for each in self.model.events if each.exogenous is not None}
         found = [
             gt.GroundEvent(
                 each.schema,
@@ -249,11 +250,26 @@ class TaskBuilder:
                 self._with_cost(each.factors, each.cost if self.model.counts_cost else Fraction(0)),
                 rounds[name],
                 each.span,
+                rates[name],
             )
             for name, instances_ in self._happening.items()
             for each in instances_
         ]
         return tuple(sorted(found, key=lambda event: (event.round, event.name)))
+
+    @staticmethod
+    def _unknown_rates(
+        events: Iterable[gt.GroundEvent], actions: Iterable[gt.GroundAction]
+    ) -> Iterator[Diagnostic]:
+        """An error for each kind of action beside which events by time cannot be drawn."""
+        by_time = [event for event in events if event.rate == "second"]
+        told: set[str] = set()
+        for action in actions if by_time else ():
+            if isinstance(action.duration, LogNormal) and action.schema not in told:
+                told.add(action.schema)
+                message = f"event `{by_time[0].schema}` is drawn by time, and `{action.schema}` is lognormal"
+                hint = "give it another duration: `(triangular least likely most)`, or `(empirical …)`"
+                yield Diagnostic("BBT0452", message, action.span, hint)
 
     def is_action(self, name: str, row: Row) -> bool:
         """Whether an action with these arguments can ever apply."""

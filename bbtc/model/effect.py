@@ -258,6 +258,20 @@ def substitute_duration(duration: LiftedDuration | None, binding: dict[str, Term
     return replace(duration, amounts=tuple(substitute_amount(each, binding) for each in duration.amounts))
 
 
+def functions_timing(duration: LiftedDuration | None, timeout: TimeOut | None) -> Iterator[str]:
+    """The functions that a duration and a time-out read, repeats included."""
+    waiting = [] if duration is None else list(duration.amounts)
+    waiting += [] if timeout is None else [timeout.seconds]
+    while waiting:
+        match waiting.pop():
+            case FunctionValue(function):
+                yield function
+            case Arithmetic(_, operands):
+                waiting.extend(operands)
+            case Constant():
+                pass
+
+
 def _substitute_timeout(timeout: TimeOut | None, binding: dict[str, Term]) -> TimeOut | None:
     if timeout is None:
         return None

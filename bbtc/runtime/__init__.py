@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
-from bbtc.runtime.moving import MovingWorld, Test
+from bbtc.runtime.moving import MovingWorld, Rounds, Test
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -57,6 +57,7 @@ __all__ = [
     "Outcome",
     "Part",
     "Retry",
+    "Rounds",
     "Shift",
     "Skipper",
     "State",

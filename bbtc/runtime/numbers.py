@@ -114,9 +114,9 @@ class MovingNumberWorld(MovingWorld):
     def _act(self, *action: str) -> Status:
         if action not in self._interrupted:
             self._change(action, self._actions[action], "no change")
-            self._happen()
+            self._happen(*action)
             return Status.SUCCESS
-        self._happen()
+        self._happen(*action)
         goes_on, abort = self._interrupted[action]
         if goes_on(self._state) is True:
             self._change(action, self._actions[action], "no change")
@@ -130,8 +130,8 @@ class MovingNumberWorld(MovingWorld):
         self._state.update(changes)
         self._report(f"{in_words(action)}: {told or otherwise}")
 
-    def _happen(self) -> None:
-        for events in self._events:
+    def _happen(self, *action: str) -> None:
+        for events in self._events[action]:
             due = [factors for test, factors in events if test(self._state) is True]
             factors = [factor for each in due for factor in each]
             changes = number_changes(self._rng, factors, self._state)

@@ -129,6 +129,68 @@ class Action:
     timing: Timing | None = None
 
 
+Moment: TypeAlias = Literal["at start", "over all", "at end"]
+
+
+@dataclass(frozen=True, slots=True)
+class TimedFormula:
+    """``(at start f)``, ``(over all f)``, ``(at end f)``."""
+
+    when: Moment
+    formula: Formula
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedChange:
+    """``(at start e)``, ``(at end e)``."""
+
+    when: Moment
+    effect: Effect
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedAll:
+    """``(and t…)`` of a durative action; without parts also ``()``."""
+
+    parts: tuple[Timed, ...]
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedForall:
+    """``(forall (params) t)``."""
+
+    parameters: TypedList
+    part: Timed
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedWhen:
+    """``(when t t)``, a condition and an effect."""
+
+    condition: Timed
+    effect: Timed
+    span: Span = span_field()
+
+
+Timed: TypeAlias = TimedFormula | TimedChange | TimedAll | TimedForall | TimedWhen
+
+
+@dataclass(frozen=True, slots=True)
+class DurativeAction:
+    """``(:durative-action name :parameters … :duration (= ?duration n) :condition … :effect …)``."""
+
+    name: Name
+    parameters: TypedList
+    duration: NumericExpression
+    condition: Timed | None
+    effect: Timed | None
+    span: Span = span_field()
+
+
 @dataclass(frozen=True, slots=True)
 class Exogenous:
     """``(:exogenous name :parameters … :precondition … :per action :before (other…) :effect …)``."""
@@ -410,6 +472,7 @@ Section: TypeAlias = (
     | Predicates
     | Functions
     | Action
+    | DurativeAction
     | Exogenous
     | Derived
     | Sensor

@@ -21,6 +21,9 @@ from bbtc.syntax.fields import (
     Condition,
     Distribution,
     Duration,
+    DurativeCondition,
+    DurativeDuration,
+    DurativeEffect,
     During,
     Effect,
     Field,
@@ -35,6 +38,7 @@ from bbtc.syntax.fields import (
     Sensed,
     Timeout,
     TimeoutProbability,
+    observed,
 )
 from bbtc.syntax.leaves import Misuse
 
@@ -56,6 +60,9 @@ _DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[
     "lognormal": ("lognormal", ("median", "sigma")),
 }
 """Distributions of durations, and what numbers they take."""
+
+
+_HOW_LONG = "write `(= ?duration n)`; or use an `:action`, with `:duration (uniform a b)` for one that varies"
 
 
 class Types(NamedTuple):
@@ -280,6 +287,37 @@ class Builder(Expressions):
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
 
+    def durative_action(
+        self, head: Token, name: Token, given: list[Field[object]], close: Token
+    ) -> ast.DurativeAction:
+        fields = Fields(given)
+        return ast.DurativeAction(
+            leaves.name(name),
+            fields.parameters(close),
+            fields.need(DurativeDuration, ":duration", "the durative action", name),
+            fields.get(DurativeCondition),
+            fields.get(DurativeEffect),
+            head.to(close),
+        )
+
+    durative_condition = DurativeCondition
+    durative_effect = DurativeEffect
+
+    def durative_duration(
+        self, keyword: Token, _: Token, variable: Token, operand: Operand, _close: Token
+    ) -> DurativeDuration:
+        if variable.text.lower() != "?duration":
+            raise Misuse("BBT0101", "a duration is given as `(= ?duration n)`", variable.span)
+        return DurativeDuration(keyword, _seconds(keyword, operand))
+
+    def duration_open(self, _: Token, empty: Token) -> DurativeDuration:
+        raise Misuse("BBT0449", "an action that takes any time is not supported", empty.span, _HOW_LONG)
+
+    def duration_bounded(self, _: Token, head: Token, _forms: list[None], close: Token) -> DurativeDuration:
+        raise Misuse(
+            "BBT0449", "a duration that the planner chooses is not supported", head.to(close), _HOW_LONG
+        )
+
     def duration(self, keyword: Token, operand: Operand) -> Duration:
         expression = _seconds(keyword, operand)
         return Duration(keyword, ast.Duration("number", (expression,), (), expression.span))
@@ -315,10 +353,10 @@ class Builder(Expressions):
         return TimeoutProbability(keyword, self.number(number))
 
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
-        return Observe(keyword, _observed(formulas))
+        return Observe(keyword, observed(formulas))
 
     def sensed(self, keyword: Token, formulas: list[ast.Formula]) -> Sensed:
-        return Sensed(keyword, _observed(formulas))
+        return Sensed(keyword, observed(formulas))
 
     def sensed_noisy(self, keyword: Token, content: ast.Probabilistic) -> Sensed:
         return Sensed(keyword, ast.Observation(content, content.span))
@@ -515,13 +553,6 @@ def _seconds(head: Token, operand: Operand) -> ast.NumericExpression:
         )
         raise Misuse("BBT0101", message, span, hint)
     return expression
-
-
-def _observed(formulas: list[ast.Formula]) -> ast.Observation:
-    first, last = formulas[0].span, formulas[-1].span
-    span = Span(first.source, first.start, last.end)
-    content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
-    return ast.Observation(content, span)
 
 
 def _state_variable(

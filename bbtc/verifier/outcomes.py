@@ -55,6 +55,7 @@ MOST_BRANCHES = 64
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _Amounts: TypeAlias = tuple[Fraction, Fraction, Fraction]  # actions, cost, reward
+_Rounds: TypeAlias = tuple[tuple[GroundEvent, ...], ...]
 Drawn: TypeAlias = tuple[
     Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction, tuple[NumberChange, ...]
 ]
@@ -98,25 +99,28 @@ class Outcomes:
     commands: list[Command] = field(default_factory=list)
     stage: int | None = None
     _stages: int = 1  # 0: no action is under way; 1: the outcome is drawn, and applies now
-    _events: int = 0  # the first stage of what happens after an action
+    _events: dict[str, int] = field(
+        default_factory=dict
+    )  # by action, the first stage of what happens after it
     _pending: dict[int, int] = field(default_factory=dict)
     _notes: dict[int, int] = field(default_factory=dict)  # those of numbers, by cell
     _entry: dict[str, int] = field(default_factory=dict)
 
-    def prepare(self, actions: Sequence[GroundAction], events: Sequence[Sequence[GroundEvent]] = ()) -> None:
-        """Write the stages of those actions that need them, and of ``events``, round by round."""
-        rounds = [[event for event in each if self._matters(event)] for each in events]
-        interrupted = [action for action in actions if action.during is not None and any(rounds)]
+    def prepare(self, actions: Sequence[GroundAction], task: Task) -> None:
+        """Write the stages of those actions that need them, and of the events of the task."""
+        meanwhile = {action.name: self._meanwhile(task, action) for action in actions}
+        moving = any(any(rounds) for rounds in meanwhile.values())
+        interrupted = [action for action in actions if action.during is not None and moving]
         staged = [
             action
             for action in actions
             if action in interrupted or combinations(action.factors) > self.most_branches
         ]
-        if not staged and not any(rounds):
+        if not staged and not moving:
             return
         self.stage = self.draft.cell(Cell("control", "stage", "stage of the outcome being drawn; 0: none", 0))
         drawn = [factor for action in staged for factor in action.possible_factors]
-        drawn += [factor for each in rounds for event in each for factor in event.factors]
+        drawn += [factor for event in task.events for factor in event.factors]
         touched = {v for effect in effects_of(drawn) for v, _ in effect.sets}
         for variable in sorted(touched & self.cell_of.keys()):
             of = self.draft.cells[self.cell_of[variable]]
@@ -126,15 +130,31 @@ class Outcomes:
             self._pending[variable] = self.draft.cell(
                 Cell("pending", of.subject, "what it becomes: 0 as it is, 1 false, 2 unknown, 3 true", 3)
             )
-        self._events = self._happen(rounds, 0)
-        for action in staged:
+        known: dict[_Rounds, int] = {}
+        applying: dict[int, int] = {0: 1}  # by what comes next: the stage in which an outcome applies
+        for action in actions:
+            rounds = meanwhile[action.name]
             if action in interrupted:
                 self._entry[action.name] = self._happen(rounds, self._going_on(action))
-            else:
-                self._entry[action.name] = self._series(action.factors, 1)
+                continue
+            if rounds not in known:
+                known[rounds] = self._happen(rounds, 0)
+            self._events[action.name] = known[rounds]
+        for action in staged:
+            if action not in interrupted:
+                after = self._events.get(action.name, 0)
+                if after not in applying:
+                    applying[after] = self._new_stage()
+                self._entry[action.name] = self._series(action.factors, applying[after])
         highest = self._stages
         self.draft.cells[self.stage] = Cell("control", "stage", self.draft.cells[self.stage].meaning, highest)
-        self._apply(1, self._events, "the outcome applies")
+        for after, stage in applying.items():
+            self._apply(stage, after, "the outcome applies")
+
+    def _meanwhile(self, task: Task, action: GroundAction) -> _Rounds:
+        """The events that happen with an action and matter, by round."""
+        rounds = (tuple(filter(self._matters, events)) for events in task.rounds(action))
+        return tuple(events for events in rounds if events)
 
     def _note_of(self, number: int) -> int:
         """The pending cell of a number."""
@@ -173,8 +193,6 @@ class Outcomes:
         """Write the stages that draw the events, then go to the stage ``after``; the first one."""
         assert self.stage is not None
         for events in reversed(rounds):
-            if not events:
-                continue
             applies = self._new_stage()
             self._apply(applies, after, "what has happened applies")
             after = applies
@@ -220,9 +238,9 @@ class Outcomes:
             assert self.stage is not None
             rewards = (_ONE, action.cost, _ZERO)
             return (Branch(_ONE, (*updates, put(self.stage, self._entry[action.name])), rewards),)
-        if self._events:
+        if self._events.get(action.name):
             assert self.stage is not None
-            updates = (*updates, put(self.stage, self._events))
+            updates = (*updates, put(self.stage, self._events[action.name]))
         merged: dict[tuple[tuple[Update, ...], _Amounts, tuple[Charged, ...]], Fraction] = {}
         for probability, effects, charges, cost, reward, changes in draws(action.factors):
             if probability:

@@ -335,8 +335,21 @@ SECTIONS: dict[str, ast.Section] = {
     "(:goal-reward 100)": ast.GoalNumber("goal-reward", number("100"), S),
     "(:metric maximize (reward))": ast.Metric("maximize", fluent("reward"), S),
     "(:metric minimize total-cost)": ast.Metric("minimize", fluent("total-cost"), S),
-    "(:durative-action go :duration (= ?duration 5))": ast.Unsupported(
-        ":durative-action", "(:durative-action go :duration (= ?duration 5))", S
+    "(:process flow :parameters () :effect (and))": ast.Unsupported(
+        ":process", "(:process flow :parameters () :effect (and))", S
+    ),
+    "(:durative-action go :duration (= ?duration 5) :condition (and (at start (p)) (over all (q))) "
+    ":effect (when (at start (p)) (at end (not (p)))))": ast.DurativeAction(
+        name("go"),
+        (),
+        number("5"),
+        ast.TimedAll(
+            (ast.TimedFormula("at start", atom("p"), S), ast.TimedFormula("over all", atom("q"), S)), S
+        ),
+        ast.TimedWhen(
+            ast.TimedFormula("at start", atom("p"), S), ast.TimedChange("at end", false("p"), S), S
+        ),
+        S,
     ),
     "(:constraints (and(always (p))))": ast.Unsupported(
         ":constraints", "(:constraints (and (always (p))))", S

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from typing_extensions import assert_never
 
 from bbtc.backends.btcpp import cppcode
@@ -12,7 +14,7 @@ from bbtc.backends.interface import Leaf, action_symbol, variable_symbol
 from bbtc.backends.shape import normal
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
 from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
-from bbtc.ground.task import Factor, Outcome, Variable
+from bbtc.ground.task import Factor, GroundEvent, Outcome, Variable
 from bbtc.kleene import Truth
 from bbtc.tree.monitor import Monitor, Telling, Walk
 from bbtc.tree.nodes import Tree
@@ -118,16 +120,16 @@ class SimulatedRobotWriter:
 
     def _moves(self) -> str:
         """What happens by itself, and which actions that may end."""
-        rounds = [
-            _rows(
-                [
-                    f"Event{{{self._anywhere(normal(self._task, event.precondition))}, "
-                    f"{self._factors(event.factors)}}}"
-                    for event in events
-                ]
-            )
-            for events in self._task.rounds
-        ]
+        tables: dict[tuple[tuple[GroundEvent, ...], ...], str] = {}
+        lines: list[str] = []
+        events: list[str] = []
+        for action in actions_used(self._tree):
+            rounds = self._task.rounds(action)
+            if rounds not in tables:
+                tables[rounds] = f"moves{len(tables) + 1}"
+                lines += [f"  static const Rounds {tables[rounds]} =", f"      {self._rounds(rounds)};"]
+            key = cppcode.literal(key_of(self._names, action_symbol(action), action.args))
+            events.append(f"{{{key}, {tables[rounds]}}}")
         interrupted = [
             f"{{{cppcode.literal(key_of(self._names, action_symbol(action), action.args))},\n"
             f"           Interruption{{{self._lambda(normal(self._task, action.during))}, "
@@ -138,8 +140,9 @@ class SimulatedRobotWriter:
         return "\n".join(
             [
                 "inline const Moves& moves() {",
+                *lines,
                 "  static const Moves all = {",
-                f"      /*rounds=*/{_rows(rounds)},",
+                f"      /*events=*/{_rows(events)},",
                 f"      /*interrupted=*/{_rows(interrupted)}}};",
                 "  return all;",
                 "}",
@@ -198,6 +201,20 @@ class SimulatedRobotWriter:
         when = "nullptr" if observation.when is None else self._lambda(observation.when)
         items = [cppcode.literal(telling.name), f"{right}u", f"{wrong}u"]
         return f"Telling{braces([*items, self._lambda(observation.condition), when])}"
+
+    def _rounds(self, rounds: Sequence[Sequence[GroundEvent]]) -> str:
+        return _rows(
+            [
+                _rows(
+                    [
+                        f"Event{{{self._anywhere(normal(self._task, event.precondition))}, "
+                        f"{self._factors(event.factors)}}}"
+                        for event in events
+                    ]
+                )
+                for events in rounds
+            ]
+        )
 
     def _anywhere(self, condition: Condition) -> str:
         return "nullptr" if condition == TRUE else self._lambda(condition)

@@ -3,7 +3,7 @@ as far as the tree can tell."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from bbtc.backends.interface import Interface
@@ -21,7 +21,7 @@ from bbtc.backends.pytrees.pycode import Code, Prefixed, call, flat, layout, lit
 from bbtc.backends.shape import normal
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
 from bbtc.ground.condition import Condition, number_in
-from bbtc.ground.task import Factor, NumberChange, Outcome, Task
+from bbtc.ground.task import Factor, GroundEvent, NumberChange, Outcome, Task
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree
 
@@ -76,13 +76,16 @@ class WorldWriter:
         return f"Moving{numbers}World" if self._task.events else f"{numbers}World"
 
     def _moving(self) -> list[list[str]]:
-        """``EVENTS`` and ``INTERRUPTED``."""
-        events = sequence(
-            sequence(
-                call("", self._test(event.precondition), self._factors(event.factors)) for event in events
-            )
-            for events in self._task.rounds
-        )
+        """What happens by itself, and ``INTERRUPTED``."""
+        tables: dict[tuple[tuple[GroundEvent, ...], ...], str] = {}
+        names: list[tuple[str, Code]] = []
+        lines: list[list[str]] = []
+        for action in self._actions:
+            rounds = self._task.rounds(action)
+            if rounds not in tables:
+                tables[rounds] = "MOVES" if not tables else f"MOVES_{len(tables) + 1}"
+                lines.append(layout(self._rounds(rounds), f"{tables[rounds]}: Rounds = "))
+            names.append((words_tuple((action.schema, *action.args)), tables[rounds]))
         interrupted = mapping(
             (
                 words_tuple((action.schema, *action.args)),
@@ -92,15 +95,24 @@ class WorldWriter:
             if action.during is not None
         )
         return [
+            *lines,
             [
-                *layout(events, "EVENTS: list[list[tuple[Test, list[Factor]]]] = "),
-                '"""What happens by itself, round by round: where it may, and what it does."""',
+                *layout(mapping(names), "EVENTS: dict[Fact, Rounds] = "),
+                '"""What happens by itself with each action, round by round: where it may, and what."""',
             ],
             [
                 *layout(interrupted, "INTERRUPTED: dict[Fact, tuple[Test, list[Factor]]] = "),
                 '"""While what actions go on that events may end, and what happens else."""',
             ],
         ]
+
+    def _rounds(self, rounds: Sequence[Sequence[GroundEvent]]) -> Code:
+        return sequence(
+            sequence(
+                call("", self._test(event.precondition), self._factors(event.factors)) for event in events
+            )
+            for events in rounds
+        )
 
     def _test(self, condition: Condition) -> Code:
         return Prefixed("lambda s: ", self._conditions.write(normal(self._task, condition), self._read))
