@@ -35,6 +35,10 @@ class World:
 
     ranges: dict[str, tuple[int, int, bool]] = field(default_factory=dict)
     actions: list[tuple[str, list[str], Any, Any]] = field(default_factory=list)
+    events: list[tuple[list[str], Any, Any]] = field(default_factory=list)
+    """What happens by itself, all of it at once."""
+    ends: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    """While what an action goes on, and what it does otherwise."""
     objects: list[str] = field(default_factory=list)
     statics: dict[str, Fraction] = field(default_factory=dict)
     goal: Any = None
@@ -65,6 +69,12 @@ class World:
                                 fields[":effect"],
                             )
                         )
+                        if ":while" in fields:
+                            world.ends[section[1]] = (fields[":while"], fields.get(":on-abort", ["and"]))
+                    case ":exogenous":
+                        fields = dict(zip(section[2::2], section[3::2], strict=True))
+                        parts = fields.get(":parameters", []), fields.get(":precondition", ["and"])
+                        world.events.append((*parts, fields[":effect"]))
                     case ":objects":
                         world.objects = section[1:]
                     case ":goal":
@@ -171,7 +181,7 @@ class World:
             case _:
                 yield Fraction(1), [("add fact", named(effect, env), None)]
 
-    def after(self, state: State, changes: list[Any]) -> State | None:
+    def after(self, state: State, changes: list[Any], *, block: bool = True) -> State | None:
         """The state once all changes are made; None where a number that blocks would leave its range."""
         true = set(state[0]) - {name for kind, name, _ in changes if kind == "delete"}
         true |= {name for kind, name, _ in changes if kind == "add fact"}
@@ -182,7 +192,7 @@ class World:
             new = max(assigned, default=Fraction(value)) + added
             assert new == int(new)
             low, high, blocks = self.ranges[name.split()[0]]
-            if blocks and not low <= new <= high:
+            if block and blocks and not low <= new <= high:
                 return None
             numbers[name] = min(max(int(new), low), high)
         return frozenset(true), tuple(sorted(numbers.items()))
@@ -194,16 +204,54 @@ class World:
                 env = dict(zip(parameters, args, strict=True))
                 if not self.holds(precondition, env, state):
                     continue
+                if self.leaves_range(effect, env, state):
+                    continue
+                goes_on, abort = self.ends.get(name, (["and"], ["and"]))
+                if not self.holds(goes_on, env, state):
+                    continue
                 found: dict[State, Fraction] = {}
-                blocked = False
-                for p, changes in self.drawn(effect, env, state):
-                    new = self.after(state, changes)
-                    if new is None:
-                        blocked = True
-                        break
-                    found[new] = found.get(new, Fraction(0)) + p
-                if not blocked:
-                    yield f"{name}({','.join(args)})", found
+                if name in self.ends:
+                    for meanwhile, p in self.happened(state).items():
+                        does = effect if self.holds(goes_on, env, meanwhile) else abort
+                        for new, q in self.results(does, env, meanwhile).items():
+                            found[new] = found.get(new, Fraction(0)) + p * q
+                else:
+                    for done, p in self.results(effect, env, state).items():
+                        for new, q in self.happened(done).items():
+                            found[new] = found.get(new, Fraction(0)) + p * q
+                yield f"{name}({','.join(args)})", found
+
+    def leaves_range(self, effect: Any, env: Env, state: State) -> bool:
+        """Would a number that blocks leave its range in some outcome?"""
+        return any(self.after(state, changes) is None for p, changes in self.drawn(effect, env, state) if p)
+
+    def results(self, effect: Any, env: Env, state: State) -> dict[State, Fraction]:
+        """What an effect leads to; numbers stay in their ranges."""
+        found: dict[State, Fraction] = {}
+        for p, changes in self.drawn(effect, env, state):
+            new = self.after(state, changes, block=False)
+            assert new is not None
+            found[new] = found.get(new, Fraction(0)) + p
+        return found
+
+    def happened(self, state: State) -> dict[State, Fraction]:
+        """The states after one draw of the events."""
+        due = []
+        for parameters, precondition, effect in self.events:
+            for args in product(self.objects, repeat=len(parameters)):
+                env = dict(zip(parameters, args, strict=True))
+                if self.holds(precondition, env, state) and not self.leaves_range(effect, env, state):
+                    due.append(list(self.drawn(effect, env, state)))
+        found: dict[State, Fraction] = {}
+        for chosen in product(*due):
+            probability, changes = Fraction(1), []
+            for p, made in chosen:
+                probability *= p
+                changes += made
+            new = self.after(state, changes, block=False)
+            assert new is not None
+            found[new] = found.get(new, Fraction(0)) + probability
+        return found
 
     def best(self, most: int) -> float | None:
         """The greatest probability of reaching the goal; None where there are more states than ``most``."""

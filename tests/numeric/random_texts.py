@@ -68,7 +68,22 @@ class Writer:
         one, other = self.draw.choice(("1/2", "1/3", "0.3")), self.draw.choice(("1/4", "0.5"))
         return f"(probabilistic {one} {self.effect(depth - 1)} {other} {self.effect(depth - 1)})"
 
-    def domain(self) -> str:
+    def events(self) -> list[str]:
+        """What happens by itself: each number, and each fact, is changed by one event at most."""
+        made = []
+        for number, target in enumerate(self.draw.sample([*_NUMBERS, *_FACTS], self.draw.randint(1, 3))):
+            if target in _FACTS:
+                effect = self.draw.choice((target, f"(not {target})"))
+            else:
+                effect = f"({self.draw.choice(('increase', 'decrease'))} {target} {self.draw.randint(1, 3)})"
+            p = self.draw.choice(("0.5", "1/3", "1"))
+            condition = self.condition(1)
+            made.append(
+                f"(:exogenous e{number} :precondition {condition} :effect (probabilistic {p} {effect}))"
+            )
+        return made
+
+    def domain(self, *, events: bool = False) -> str:
         """A domain with its problem."""
         low, high = self.draw.randint(-2, 1), self.draw.randint(3, 9)
         most = self.draw.randint(2, 6)
@@ -77,8 +92,13 @@ class Writer:
         actions = []
         for number in range(self.draw.randint(2, 4)):
             ready, used = (f" (ready{number})", f" (not (ready{number}))") if once else ("", "")
+            ends = ""
+            if events and self.draw.random() < 0.4:
+                held = self.draw.choice(_FACTS)
+                ends = f" :while {held} :on-abort {self.effect(1)}"
+                ready += f" {held}"
             actions.append(
-                f"(:action a{number} :precondition (and {self.condition()}{ready})"
+                f"(:action a{number} :precondition (and {self.condition()}{ready}){ends}"
                 f" :effect (and {self.effect()} {self.effect()}{used}))"
             )
         flags = [f"(ready{number})" for number in range(len(actions))]
@@ -91,7 +111,7 @@ class Writer:
             f"(define (domain d) (:predicates (p0) (p1) (q ?x) {' '.join(flags)})\n"
             f"  (:functions (n) - (int {low} {high}{policies[0]})\n"
             f"    (m ?x) - (int 0 {most}{policies[1]}) (c ?x))\n  "
-            + "\n  ".join(actions)
+            + "\n  ".join([*actions, *(self.events() if events else ())])
             + f")\n(define (problem p) (:domain d) (:objects a b)\n  (:init {start} {values})\n"
             f"  (:goal {self.condition(1)}))\n"
         )
