@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import Draw, Values, add, compile_factor, product_of
 from bbtc.belief.hidden import compile_change, told_first
-from bbtc.ground.condition import compile_condition
+from bbtc.ground.condition import TRUE, compile_condition
 from bbtc.ground.task import NO_CHANGE, ONE, ZERO, GroundAction, GroundEvent, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -70,6 +70,23 @@ class Bounded:
             self._limits.check_time("working out what an action leads to")
 
 
+def compile_parts(task: Task, action: GroundAction, limits: Limits) -> tuple[Transition, Transition]:
+    """An action with events that may end it, in two parts: what happens where it goes on to its end, and
+    where it is aborted. The probabilities of the results of both sum to 1, together."""
+    bounded = Bounded(limits)
+    own, abort = _compile_own(task, action, bounded), _compile_abort(action, bounded)
+    events = _compile_events(task.rounds(action), bounded)
+    goes_on = compile_condition(action.during or TRUE)
+
+    def part(ends: Transition, *, aborted: bool) -> Transition:
+        def some(values: Values) -> tuple[Result, ...]:
+            return () if (goes_on(values) != Truth.TRUE) is not aborted else ends(values)
+
+        return _cached(lambda values: _merged(_then(events(values), some), bounded))
+
+    return part(own, aborted=False), part(abort, aborted=True)
+
+
 def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transition:
     """An action of the task, and the events that happen with it, as a function from values to the results:
     equal results merged, most probable first (ties by values). Results are cached per assignment. The
@@ -79,15 +96,11 @@ def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transiti
     own = _compile_own(task, action, bounded)
     if not task.events and action.during is None:
         return own
-    events = _compile_events(task.rounds(action), bounded)
     if action.during is None:
+        events = _compile_events(task.rounds(action), bounded)
         return _cached(lambda values: _merged(_then(own(values), events), bounded))
-    goes_on, abort = compile_condition(action.during), _compile_abort(action, bounded)
-
-    def interrupted(values: Values) -> tuple[Result, ...]:
-        return own(values) if goes_on(values) == Truth.TRUE else abort(values)
-
-    return _cached(lambda values: _merged(_then(events(values), interrupted), bounded))
+    ends, aborted = compile_parts(task, action, limits)
+    return _cached(lambda values: _merged((*ends(values), *aborted(values)), bounded))
 
 
 def _compile_own(task: Task, action: GroundAction, bounded: Bounded) -> Transition:

@@ -4,6 +4,7 @@ runtime=imported``, they import it from here. It needs py_trees (2.2 or later) a
 from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
+from bbtc.runtime.limits import Within, within
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
 from bbtc.runtime.moving import MovingWorld, Rounds, Test
 from bbtc.runtime.nodes import (
@@ -31,6 +32,15 @@ from bbtc.runtime.nodes import (
     until_success,
     view,
 )
+from bbtc.runtime.numbers import (
+    MovingNumberWorld,
+    NumberBeliefs,
+    NumberWorld,
+    Shift,
+    Values,
+    between,
+    on_numbers,
+)
 from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
 __all__ = [
@@ -43,11 +53,15 @@ __all__ = [
     "Latch",
     "Monitor",
     "Move",
+    "MovingNumberWorld",
     "MovingWorld",
+    "NumberBeliefs",
+    "NumberWorld",
     "Outcome",
     "Part",
     "Retry",
     "Rounds",
+    "Shift",
     "Skipper",
     "State",
     "StopOutside",
@@ -56,19 +70,23 @@ __all__ = [
     "Test",
     "Try",
     "UntilSuccess",
+    "Values",
     "View",
     "Walk",
     "When",
     "WithBeliefs",
     "WithSetup",
+    "Within",
     "World",
     "all_of",
     "any_of",
+    "between",
     "draw",
     "fallback",
     "happen",
     "in_words",
     "negated",
+    "on_numbers",
     "retry",
     "run",
     "sequence",
@@ -77,4 +95,5 @@ __all__ = [
     "until_success",
     "view",
     "watched",
+    "within",
 ]

@@ -39,6 +39,7 @@ from bbtc.syntax.fields import (
     Timeout,
     TimeoutProbability,
     Uninterruptible,
+    observed,
 )
 from bbtc.syntax.leaves import Misuse
 
@@ -69,6 +70,13 @@ class Types(NamedTuple):
     """``- type`` or ``- (either type…)`` behind names."""
 
     names: tuple[ast.Name, ...]
+    span: Span
+
+
+class NumberRange(NamedTuple):
+    """``- (int low high)`` behind a function, with what it spans."""
+
+    range: ast.NumberRange
     span: Span
 
 
@@ -173,12 +181,22 @@ class Builder(Expressions):
         return ast.Functions(tuple(declarations), head.to(close))
 
     def function(
-        self, head: Token, parameters: ast.TypedList, close: Token, types: Types | None = None
+        self,
+        head: Token,
+        parameters: ast.TypedList,
+        close: Token,
+        types: Types | NumberRange | None = None,
     ) -> _Function:
         return _function(next(leaves.names(head)), parameters, head.to(close), types)
 
-    def function_bare(self, name: Token, types: Types | None = None) -> _Function:
+    def function_bare(self, name: Token, types: Types | NumberRange | None = None) -> _Function:
         return _function(leaves.name(name), (), name.span, types)
+
+    def number_range(self, dash: Token, head: Token, low: Token, high: Token, *rest: Token) -> NumberRange:
+        policy = leaves.name(rest[0]) if len(rest) > 1 else None
+        span = head.to(rest[-1])
+        given = ast.NumberRange(self.number(low), self.number(high), policy, span)
+        return NumberRange(given, dash.to(rest[-1]))
 
     # --- actions and the like ----------------------------------------------------------------
 
@@ -340,10 +358,10 @@ class Builder(Expressions):
         return TimeoutProbability(keyword, self.number(number))
 
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
-        return Observe(keyword, _observed(formulas))
+        return Observe(keyword, observed(formulas))
 
     def sensed(self, keyword: Token, formulas: list[ast.Formula]) -> Sensed:
-        return Sensed(keyword, _observed(formulas))
+        return Sensed(keyword, observed(formulas))
 
     def sensed_noisy(self, keyword: Token, content: ast.Probabilistic) -> Sensed:
         return Sensed(keyword, ast.Observation(content, content.span))
@@ -501,6 +519,11 @@ class Builder(Expressions):
     def body_retry(self, head: Token, number: Token, child: ast.Body, close: Token) -> ast.BodyRetry:
         return ast.BodyRetry(self.number(number), child, head.to(close))
 
+    def body_timeout(self, head: Token, _number: Token, _child: ast.Body, close: Token) -> ast.Body:
+        message = "a time limit on a part of a body is not supported"
+        hint = "give the action one: `:timeout`, which every tree keeps"
+        raise Misuse("BBT0450", message, head.to(close), hint)
+
     def body_condition(self, head: Token, formula: ast.Formula, close: Token) -> ast.BodyCondition:
         return ast.BodyCondition(formula, head.to(close))
 
@@ -542,13 +565,6 @@ def _seconds(head: Token, operand: Operand) -> ast.NumericExpression:
     return expression
 
 
-def _observed(formulas: list[ast.Formula]) -> ast.Observation:
-    first, last = formulas[0].span, formulas[-1].span
-    span = Span(first.source, first.start, last.end)
-    content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
-    return ast.Observation(content, span)
-
-
 def _state_variable(
     head: Token, name: ast.Name, parameters: ast.TypedList | None, values: list[ast.Formula], close: Token
 ) -> ast.StateVariable:
@@ -572,11 +588,15 @@ def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: b
     return ast.PredicateDeclaration(leaves.declared("predicate", name), parameters, unknown, span)
 
 
-def _function(name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | None) -> _Function:
+def _function(
+    name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | NumberRange | None
+) -> _Function:
     declared = leaves.declared("function", name)
     if types is None:
         return ast.FunctionDeclaration(declared, parameters, (), span)
     whole = Span(span.source, span.start, types.span.end)
+    if isinstance(types, NumberRange):
+        return ast.FunctionDeclaration(declared, parameters, (), whole, types.range)
     return ast.FunctionDeclaration(declared, parameters, types.names, whole)
 
 

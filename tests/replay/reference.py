@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field
 
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within
 from bbtc.ground.task import Factor, GroundAction, Task
 from bbtc.kleene import Truth
 from bbtc.replay.script import Run, Script, Values
@@ -34,6 +34,10 @@ def value_of(condition: Condition, values: Values) -> str:
         if condition.value is Truth.UNKNOWN:
             return "T" if letter == "U" else "F"
         return letter if condition.value is Truth.TRUE else NOT[letter]
+    if isinstance(condition, Within):
+        digits = enumerate(condition.digits)
+        number = sum(2**place for place, digit in digits if values[digit] == 2)
+        return "T" if condition.low <= number <= condition.high else "F"
     if isinstance(condition, Not):
         return NOT[value_of(condition.part, values)]
     result, table = ("T", AND) if isinstance(condition, And) else ("F", OR)

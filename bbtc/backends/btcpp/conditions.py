@@ -3,6 +3,7 @@
 A literal is a leaf: SUCCESS, FAILURE, RUNNING for true, false, unknown. What is built from leaves:
 
 - ``not p``: Inverter, which keeps RUNNING;
+- ``n >= 5``, ``2 <= n <= 5``: the leaf of the number, with the bounds in its ports;
 - ``unknown p``, ``known p``: the leaf with its two other results forced to one, and beside it, in a
   Skipper, the answer for RUNNING; as a BehaviorTree per predicate;
 - ``and``, ``or`` with at most one part that can be unknown: ReactiveSequence, ReactiveFallback with
@@ -23,13 +24,14 @@ from xml.etree.ElementTree import Element
 
 from typing_extensions import assert_never
 
-from bbtc.backends.btcpp.holding import Holding, Ports
+from bbtc.backends.btcpp.holding import Holding, Ports, bounds_given
 from bbtc.backends.btcpp.idioms import Idioms, decorated
 from bbtc.backends.btcpp.names import BtcppNames, TreeIds, is_numeric, ports_for
+from bbtc.backends.commitment import Fact, facts_read, first_variable
 from bbtc.backends.interface import variable_symbol
 from bbtc.backends.names import Namer, Symbol
 from bbtc.backends.shape import can_be_unknown, words_of
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, variables
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 
@@ -59,7 +61,7 @@ class ConditionWriter:
                 return sum(can_be_unknown(self._task, part) for part in parts) > 1 or any(
                     self.uses_register(part) for part in parts
                 )
-            case Is() | Known() | Not() | Constant():
+            case Is() | Known() | Within() | Not() | Constant():
                 return False
             case _:
                 assert_never(condition)
@@ -78,7 +80,7 @@ class ConditionWriter:
         match condition:
             case Is(_, Truth.TRUE) | Constant():
                 pass
-            case Is() | Known() | Not() | And() | Or():
+            case Is() | Known() | Within() | Not() | And() | Or():
                 # A SubTree says all in its tag, and its name would have to be unique.
                 if element.tag != "SubTree":
                     element.set("name", self.label(condition, ports))
@@ -110,20 +112,21 @@ class ConditionWriter:
         for fact, port in inside.facts.items():
             element.set(port, self._holding.entry(fact, ports))
 
-    def shared(self, facts: Iterable[int], args: Mapping[str, str]) -> Ports:
+    def shared(self, facts: Iterable[Fact], args: Mapping[str, str]) -> Ports:
         """The ports of a BehaviorTree that reads or notes these facts. Only standard nodes need entries."""
         return self._holding.ports(facts, args) if self._idioms.profile == "stock" else Ports(args)
 
-    def notes(self, facts: Sequence[int], ports: Ports) -> list[Element]:
+    def notes(self, facts: Sequence[Fact], ports: Ports) -> list[Element]:
         """Nodes that write down what facts are, for standard nodes. Where some facts of a predicate are about
         no argument, all of them are written out, as they are for other arguments: such actions share a
         BehaviorTree."""
         if self._idioms.profile != "stock":
             return []
-        outright = {self._task.variables[fact].predicate for fact in facts if fact not in ports.facts}
+        symbols = {fact: variable_symbol(self._task.variables[first_variable(fact)]) for fact in facts}
+        outright = {symbol for fact, symbol in symbols.items() if fact not in ports.facts}
         return [
-            self._kept("Note", fact, Ports() if self._task.variables[fact].predicate in outright else ports)
-            for fact in facts
+            self._kept("Note", fact, Ports() if symbol in outright else ports)
+            for fact, symbol in symbols.items()
         ]
 
     def value(self, arg: str, ports: Ports) -> str:
@@ -141,7 +144,7 @@ class ConditionWriter:
                 strict=True,
             )
         )
-        return self.shared(variables(condition), ports_for(uses))
+        return self.shared(facts_read(self._task, condition), ports_for(uses))
 
     def _title(self, condition: Condition) -> str:
         match condition:
@@ -154,6 +157,8 @@ class ConditionWriter:
                 return word + self._names.plain[variable_symbol(self._task.variables[variable])]
             case Known(variable):
                 return "Known" + self._names.plain[variable_symbol(self._task.variables[variable])]
+            case Within(digits):
+                return self._names.plain[variable_symbol(self._task.variables[digits[0]])]
             case Not(part):
                 return "Not" + self._title(part)
             case And(parts):
@@ -175,6 +180,8 @@ class ConditionWriter:
                 return self._test("unknown", variable, ports)
             case Known(variable):
                 return self._test("known", variable, ports)
+            case Within():
+                return self._number(condition, ports)
             case Not(part):
                 return decorated("Inverter", self._kleene(part, ports))
             case And(parts):
@@ -212,14 +219,16 @@ class ConditionWriter:
     def _is_held(self, variable: int, ports: Ports) -> bool:
         return not ports.live and variable in self._holding.entries
 
-    def _kept(self, kind: Literal["Held", "Note"], variable: int, ports: Ports) -> Element:
+    def _kept(self, kind: Literal["Held", "Note"], fact: Fact, ports: Ports) -> Element:
         """A leaf that may be held, or the note of what it reads: a BehaviorTree of each predicate, but for
         numbers, which may change on their way into one, and for our own node."""
         write = self._idioms.held if kind == "Held" else self._idioms.note
-        read, entry = self._task.variables[variable], self._holding.entry(variable, ports)
-        symbol = variable_symbol(read)
+        read, entry = self._task.variables[first_variable(fact)], self._holding.entry(fact, ports)
+        symbol, live = variable_symbol(read), replace(ports, live=True)
+        if isinstance(fact, Within):
+            return write(self._number(fact, live), entry if kind == "Held" else entry[1:-1])
         if self._idioms.profile == "bbtc" or any(is_numeric(arg) for arg in read.args):
-            leaf = self._leaf(variable, replace(ports, live=True))
+            leaf = self._leaf(fact, live)
             return write(leaf, entry if kind == "Held" else entry[1:-1])
         port = self._entry_port(symbol)
         if (kind, symbol) not in self._around:
@@ -247,6 +256,15 @@ class ConditionWriter:
         self.trees[tree_id].append(content)
         self.ports[tree_id] = (*self._parameters(symbol), *more)
         return tree_id
+
+    def _number(self, test: Within, ports: Ports) -> Element:
+        """The leaf of a number with what it is compared with; the ends of its range are no bounds."""
+        if not ports.live and test in self._holding.entries:
+            return self._kept("Held", test, ports)
+        element = self._leaf(test.digits[0], ports)
+        for port, value in bounds_given(self._task, test).items():
+            element.set(port, value)
+        return element
 
     def _test(self, kind: Literal["known", "unknown"], variable: int, ports: Ports) -> Element:
         read = self._task.variables[variable]

@@ -20,6 +20,7 @@ from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, 
 from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE, condition_below, notes, template_label
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.backends.btcpp.palette import node_model
+from bbtc.backends.commitment import Fact, facts_read
 from bbtc.backends.exporter import Figures, Option, OptionValue
 from bbtc.backends.interface import action_symbol, guard_of, variable_symbol
 from bbtc.backends.shape import fit, written
@@ -234,18 +235,18 @@ class _Writer:
         """A port for every argument of a template that the leaves of its expansion name, and for every fact
         about one that may be held."""
         uses: list[tuple[str, str]] = []
-        facts: list[int] = []
+        facts: list[Fact] = []
         for node in walk(root):
-            read: list[int] = []
+            read: Condition = TRUE
             if isinstance(node, ConditionNode):
-                read = list(variables(written(self.task, node.condition)))
-                facts += read
+                read = written(self.task, node.condition)
             elif isinstance(node, ActionNode):
                 action = self.task.action_by_name[node.action]
                 uses += self._ports(action)
-                read = list(variables(guard_of(self.task, node) or TRUE))
-                facts += [*self.holding.by_action.get(node.action, ()), *read]
-            for variable in (self.task.variables[index] for index in read):
+                read = guard_of(self.task, node) or TRUE
+                facts += self.holding.by_action.get(node.action, ())
+            facts += facts_read(self.task, read)
+            for variable in (self.task.variables[index] for index in variables(read)):
                 parameters = self.names.interface.leaves[variable_symbol(variable)].parameters
                 uses += zip(parameters, variable.args, strict=True)
         ports = ports_for((parameter, arg) for parameter, arg in uses if arg in args)
@@ -277,7 +278,7 @@ class _Writer:
             for scripts in place.forget:
                 scripts.append(forgotten(entry))
         if self.profile == "bbtc":
-            tag = self._leaf(action, place.ports)
+            tag = self._limited(self._leaf(action, place.ports), action)
             needed = self._start_conditions(guard, place.ports, place.counters)
             element = self.idioms.latch(tag, needed, node.latched)
             given = {"name": label, "entry": entry, "sets": self.holding.named(held, args)}
@@ -306,8 +307,9 @@ class _Writer:
         tag = Element(self.names.ids[action_symbol(action)])
         for port, arg in self._ports(action):
             tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
+        tag = self._limited(tag, action)
         held = self.holding.by_action.get(node.action, ())
-        used = [*held, *variables(guard or TRUE)]
+        used = [*held, *facts_read(self.task, guard or TRUE)]
         ports = self.holding.ports(used, {arg: port for port, arg in reversed(passed.items())})
         needed = self._start_conditions(guard, ports, counters, held)
         title = self.names.plain[action_symbol(action)]
@@ -326,7 +328,7 @@ class _Writer:
         return self.action_trees[key].attrib["ID"], ports
 
     def _start_conditions(
-        self, guard: Condition | None, ports: Ports, counters: tuple[str, ...], held: Sequence[int] = ()
+        self, guard: Condition | None, ports: Ports, counters: tuple[str, ...], held: Sequence[Fact] = ()
     ) -> list[Element]:
         read = None if guard is None else self.conditions.write(written(self.task, guard), ports)
         return self.idioms.start_conditions(read, counters, self.conditions.notes(held, ports))
@@ -336,6 +338,9 @@ class _Writer:
         for port, arg in self._ports(action):
             element.set(port, self.conditions.value(arg, ports))
         return element
+
+    def _limited(self, leaf: Element, action: GroundAction) -> Element:
+        return leaf if action.timeout is None else self.idioms.given_up(leaf, action.timeout)
 
     def _ports(self, action: GroundAction) -> list[tuple[str, str]]:
         parameters = self.names.interface.leaves[action_symbol(action)].parameters

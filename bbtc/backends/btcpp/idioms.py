@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Literal, TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
@@ -22,6 +23,7 @@ SKIPPER, LATCH, HELD, COMMITTED = "Skipper", "Latch", "Held", "Committed"
 """Ids of our own nodes: two control nodes, and what stands around leaves and around the tree."""
 
 UNTIL_SUCCESS = "RetryUntilSuccessful"
+TIMEOUT = "Timeout"
 
 SKIPPER_LABEL = "skipper"
 """The name that a Parallel gets where the Skipper has none."""
@@ -221,6 +223,12 @@ class Idioms:
         unknown = Element("Script", code=f"{entry} := 'unknown'")
         return decorated("ForceSuccess", self.control("skipper", [leaf, unknown]))
 
+    def given_up(self, leaf: Element, seconds: Fraction) -> Element:
+        """The action, which has ended when it is given up after so many seconds, as it has when it fails."""
+        limit = decorated(TIMEOUT, leaf)
+        limit.set("msec", str(milliseconds(seconds)))
+        return decorated("ForceSuccess", limit)
+
     # --- tests and registers -----------------------------------------------------------------
 
     def test(self, kind: Literal["known", "unknown"], leaf: Element) -> Element:
@@ -239,6 +247,11 @@ class Idioms:
         answer = Element("Precondition", {"if": "_value != 'unknown'", "else": "RUNNING"})
         SubElement(answer, "ScriptCondition", code="_value == 'true'")
         return self.control("sequence", [read, answer])
+
+
+def milliseconds(seconds: Fraction) -> int:
+    """The next whole number of them."""
+    return -int(-seconds * 1000 // 1)
 
 
 def attempt_ends(state: str, forget: Sequence[str]) -> dict[str, str]:

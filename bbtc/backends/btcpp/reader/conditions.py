@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Generic, Protocol, TypeVar
 
 from bbtc.artefacts.cursor import clip
@@ -23,6 +23,7 @@ from bbtc.backends.btcpp.reader.patterns import (
 )
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.commitment import Fact
 from bbtc.backends.shape import DEEPEST_CONDITION, can_be_unknown
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Or, negation
 from bbtc.ground.task import Task
@@ -107,7 +108,7 @@ class ConditionReader(Generic[S]):
         elif test is not None:
             condition = self._test(test, scope)
         elif (held := match_one(HELD_LEAF, element)) is not None:
-            condition = Is(self._held(held, scope), Truth.TRUE)
+            condition = self._held(held, scope)
         elif has(element, "SubTree"):
             condition = yield self.read(*self._call(element, scope), level)
         elif has(element, "Inverter", 1):
@@ -120,7 +121,7 @@ class ConditionReader(Generic[S]):
             if not has(element, "Parallel"):
                 self._check_order(element, condition)
         elif self._leaves.is_leaf(element) and not element.children:
-            condition = Is(self._live(element, scope), Truth.TRUE)
+            condition = self._live(element, scope)
         else:
             message = f"'{clip(tag_of(element))}' is not part of a condition"
             raise unreadable(self._document, element, "BBT0616", message)
@@ -134,29 +135,33 @@ class ConditionReader(Generic[S]):
             self._unread.took(leaf)
             leaf, inside = self._call(leaf, scope)
         held = match_one(HELD_LEAF, leaf)
-        variable = self._live(leaf, inside) if held is None else self._held(held, inside)
+        read = self._live(leaf, inside) if held is None else self._held(held, inside)
+        if not isinstance(read, Is):
+            message = f"'{clip(tag_of(leaf))}' is always known"
+            raise unreadable(self._document, leaf, "BBT0616", message)
+        variable = read.variable
         return Known(variable) if test.shape is KNOWN else Is(variable, Truth.UNKNOWN)
 
-    def _live(self, leaf: XmlElement, scope: S) -> int:
-        """The variable that a leaf reads as it is."""
-        variable = self._leaves.variable(leaf, scope.ports)
-        self._holds.live.add(variable)
-        return variable
+    def _live(self, leaf: XmlElement, scope: S) -> Condition:
+        """What a leaf reads as it is."""
+        condition = self._leaves.condition(leaf, scope.ports)
+        self._holds.live.update(self._holds.facts_of(condition))
+        return condition
 
-    def _held(self, held: Match, scope: S) -> int:
-        """The variable that a leaf reads, where that may be held."""
+    def _held(self, held: Match, scope: S) -> Condition:
+        """What a leaf reads, where that may be held."""
         self._unread.take(held)
         leaf = held.part("leaf")
         if not self._leaves.is_leaf(leaf) or self._leaves.is_action(leaf):
             message = f"'{clip(tag_of(leaf))}' is no condition of the task that could be held"
             raise unreadable(self._document, leaf, "BBT0616", message)
-        variable = self._leaves.variable(leaf, scope.ports)
-        if "held" in held.texts:
-            self._holds.entry(held.part("leaf"), held.texts["held"], scope.ports, variable)
-        return variable
+        condition = self._leaves.condition(leaf, scope.ports)
+        for fact in self._holds.facts_of(condition) if "held" in held.texts else ():
+            self._holds.entry(leaf, held.texts["held"], scope.ports, fact)
+        return condition
 
-    def note(self, element: XmlElement, scope: S) -> int:
-        """The variable that a note tells of. Raises :class:`bbtc.diagnostics.Unreadable`."""
+    def note(self, element: XmlElement, scope: S) -> Iterator[Fact]:
+        """What a note tells of. Raises :class:`bbtc.diagnostics.Unreadable`."""
         self._count()
         self._unread.took(element)
         if has(element, "SubTree"):
@@ -166,9 +171,10 @@ class ConditionReader(Generic[S]):
             message = f"'{clip(tag_of(element))}' does not write down what an action may set"
             raise unreadable(self._document, element, "BBT0616", message)
         self._unread.take(found)
-        variable = self._leaves.variable(found.part("leaf"), scope.ports)
-        self._holds.entry(found.part("leaf"), found.texts["held"], scope.ports, variable)
-        return variable
+        leaf = found.part("leaf")
+        for fact in self._holds.facts_of(self._leaves.condition(leaf, scope.ports)):
+            self._holds.entry(leaf, found.texts["held"], scope.ports, fact)
+            yield fact
 
     def _kind(
         self, element: XmlElement, *, registered: bool

@@ -10,8 +10,9 @@ from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.reader.leaves import Leaves
 from bbtc.backends.btcpp.reader.unread import unreadable
 from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
-from bbtc.backends.commitment import held_by
+from bbtc.backends.commitment import Fact, first_variable, held_by
 from bbtc.diagnostics import Diagnostic
+from bbtc.ground.condition import Condition, Is, Within
 from bbtc.tree.nodes import Tree, actions_of
 
 _FACT = re.compile(r"(\w+)\(([^()]*)\)")
@@ -21,16 +22,16 @@ class Holds:
     """What has been read: the facts that conditions read as they are, and what each action holds."""
 
     def __init__(self, document: XmlDocument, leaves: Leaves) -> None:
-        self.live: set[int] = set()
+        self.live: set[Fact] = set()
         self._document = document
         self._leaves = leaves
         self.set_back: frozenset[str] = frozenset()
         """The entries that the root makes live again."""
-        self._facts: dict[str, int] = {}
+        self._facts: dict[str, Fact] = {}
         self._places: dict[str, XmlElement] = {}
-        self._actions: list[tuple[XmlElement, frozenset[int], bool]] = []
+        self._actions: list[tuple[XmlElement, frozenset[Fact], bool]] = []
 
-    def entry(self, leaf: XmlElement, name: str, ports: Mapping[str, str], variable: int) -> None:
+    def entry(self, leaf: XmlElement, name: str, ports: Mapping[str, str], fact: Fact) -> None:
         """An entry of the blackboard, or the port of one, stands for a fact. Raises
         :class:`~bbtc.backends.btcpp.reader.unread.Unreadable`."""
         entry = name if name.startswith("@") else ports.get(name, "").strip("{}")
@@ -38,7 +39,7 @@ class Holds:
             message = f"'{clip(name)}' is no port that stands for an entry of the root blackboard"
             raise unreadable(self._document, leaf, "BBT0606", message)
         self._places.setdefault(entry, leaf)
-        if self._facts.setdefault(entry, variable) != variable:
+        if self._facts.setdefault(entry, fact) != fact:
             message = f"the entry '{clip(entry)}' stands for two facts"
             raise unreadable(self._document, leaf, "BBT0616", message)
 
@@ -50,7 +51,7 @@ class Holds:
                 hint = "an export does so in the first nodes of its main tree"
                 yield unreadable(self._document, place, "BBT0616", message, hint=hint).diagnostic
 
-    def listed(self, latch: XmlElement, text: str, ports: Mapping[str, str]) -> Iterator[int]:
+    def listed(self, latch: XmlElement, text: str, ports: Mapping[str, str]) -> Iterator[Fact]:
         """The facts that a Latch sets. Raises :class:`~bbtc.backends.btcpp.reader.unread.Unreadable`."""
         for fact in filter(None, (part.strip() for part in text.split(";"))):
             found = _FACT.fullmatch(fact)
@@ -60,9 +61,17 @@ class Holds:
                 raise unreadable(self._document, latch, "BBT0616", message, attribute="sets", hint=hint)
             given = [part.partition("=") for part in found[2].split(",") if part]
             leaf = XmlElement(found[1], {port: value for port, _, value in given}, latch.start)
-            yield self._leaves.variable(leaf, ports)
+            yield from self.facts_of(self._leaves.condition(leaf, ports))
 
-    def action(self, element: XmlElement, held: frozenset[int], waits: bool) -> None:
+    @staticmethod
+    def facts_of(condition: Condition) -> Iterator[Fact]:
+        """What a leaf asks for; nothing where that is certain."""
+        if isinstance(condition, Is):
+            yield condition.variable
+        elif isinstance(condition, Within):
+            yield condition
+
+    def action(self, element: XmlElement, held: frozenset[Fact], waits: bool) -> None:
         """An action has been read."""
         self._actions.append((element, held, waits))
 
@@ -75,9 +84,9 @@ class Holds:
             return
         for node, (element, held, waits) in zip(nodes, self._actions, strict=True):
             facts = frozenset(wanted.get(node.action, ()))
-            lacks = sorted(facts - held) or sorted(facts & self.live & read)
+            lacks = (facts - held) or (facts & self.live & read)
             if not waits or lacks:
-                names = ", ".join(tree.task.variables[fact].name for fact in lacks)
+                names = ", ".join(sorted({tree.task.variables[first_variable(fact)].name for fact in lacks}))
                 what = f"what it may set itself is not held: {clip(names)}" if lacks else "others start then"
                 message = f"while '{clip(node.action)}' runs, {what}"
                 hint = "export the tree anew: its own effects may end the action, in the file, before its end"

@@ -23,6 +23,7 @@ from bbtc.backends.btcpp.idioms import (
     forgotten,
     full_again,
     is_retry_label,
+    milliseconds,
 )
 from bbtc.backends.btcpp.names import is_numeric, shown, without_number
 from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE
@@ -32,6 +33,7 @@ from bbtc.backends.btcpp.reader.layout import Layout, is_port
 from bbtc.backends.btcpp.reader.leaves import Leaves
 from bbtc.backends.btcpp.reader.notes import Notes, read_notes, with_notes
 from bbtc.backends.btcpp.reader.patterns import (
+    GIVEN_UP,
     NOT_COMMITTED,
     READ,
     REGISTER,
@@ -515,14 +517,19 @@ class _Reader:
         """The action node of an idiom. ``element`` carries its label; the idiom itself may stand in a
         BehaviorTree, with a scope ``inside`` it."""
         self._unread.take(parts.found)
-        if self._leaves.is_leaf(parts.leaf) and not parts.leaf.children:
-            name = self._leaves.action(parts.leaf, inside.ports)
+        limited = match(GIVEN_UP, parts.leaf)
+        if limited is not None:
+            self._unread.take(limited)
+        leaf = parts.leaf if limited is None else limited.part("leaf")
+        if self._leaves.is_leaf(leaf) and not leaf.children:
+            name = self._leaves.action(leaf, inside.ports)
         else:
-            message, hint = self._no_counterpart(parts.leaf)
-            raise unreadable(self._document, parts.leaf, "BBT0616", message, hint=hint)
+            message, hint = self._no_counterpart(leaf)
+            raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
+        self._check_limit(leaf, None if limited is None else limited.texts["msec"], name)
         self._check_entries(element, parts, name, inside)
         guarded = yield self._guarded(parts, name, inside)
-        held = [self._conditions.note(note, inside) for note in parts.notes]
+        held = [fact for note in parts.notes for fact in self._conditions.note(note, inside)]
         held += self._holds.listed(element, parts.sets, inside.ports)
         self._holds.action(element, frozenset(held), parts.waits)
         if parts.counters != inside.counters:
@@ -537,6 +544,20 @@ class _Reader:
             label = without_number(label)
         own = label if label and label != shown(auto) else None
         return ActionNode("", name, parts.latched, bool(guarded), own)
+
+    def _check_limit(self, leaf: XmlElement, found: str | None, name: str) -> None:
+        """An action is given up when the task says so, which its figures rest on."""
+        seconds = self._task.action_by_name[name].timeout
+        wanted = None if seconds is None else str(milliseconds(seconds))
+        if found == wanted:
+            return
+        if wanted is None:
+            message = f"'{clip(name)}' is given up after {found} ms, and has no time-out in the task"
+            hint = "say so in the domain: `:timeout`, in seconds"
+        else:
+            message = f"'{clip(name)}' has to be given up after {wanted} ms"
+            hint = f'<ForceSuccess><Timeout msec="{wanted}">…</Timeout></ForceSuccess> does so'
+        raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
 
     def _check_entries(self, element: XmlElement, parts: ActionParts, name: str, inside: Scope) -> None:
         """The entries of the blackboard through which an action speaks with the rest of the tree."""
