@@ -52,6 +52,8 @@ class _Sequential:
         self._report = report
         self._parts = _Parts()
         self._bound: set[str] = set()
+        self._counted = {name for _, effect in self._effects_at_start() for name in _changed_numbers(effect)}
+        """Functions that the start changes."""
         if node.condition is not None:
             self._parts.conditions = list(self._conditions(node.condition))
         if node.effect is not None:
@@ -136,7 +138,7 @@ class _Sequential:
             for when, effect in self._effects_at_start()
             for leaf in (*_plain(effect), *_inner(effect))
         }
-        if first & set(_predicates(formula)):
+        if first & set(_predicates(formula)) or self._counted & set(_compared(formula)):
             self._refuse(
                 "an effect asks at the end for what the action itself sets at its start", self._node.span
             )
@@ -182,6 +184,10 @@ class _Sequential:
                     self._refuse("a quantifier takes the name of a parameter", span)
                 return ast.Quantified(kind, parameters, self._before(part), span)
             case ast.Empty() | ast.Equality() | ast.Unsupported():
+                return formula
+            case ast.Comparison(_, left, right, span):
+                if self._counted & {*_numbers(left), *_numbers(right)}:
+                    self._refuse("it compares a number that it changes at its start", span)
                 return formula
             case ast.Test() | ast.Believed():
                 if set(_predicates(formula)) & (
@@ -315,10 +321,55 @@ def _predicates(formula: ast.Formula) -> Iterator[str]:
             yield from (*_predicates(premise), *_predicates(conclusion))
         case ast.Test(_, atom):
             yield from _predicates(atom)
-        case ast.Empty() | ast.Equality() | ast.Unsupported():
+        case ast.Empty() | ast.Equality() | ast.Comparison() | ast.Unsupported():
             return
         case _:
             assert_never(formula)
+
+
+def _compared(formula: ast.Formula) -> Iterator[str]:
+    """The functions that a condition compares."""
+    match formula:
+        case ast.Comparison(_, left, right):
+            yield from (*_numbers(left), *_numbers(right))
+        case ast.Not(part) | ast.Quantified(_, _, part) | ast.Believed(part):
+            yield from _compared(part)
+        case ast.And(parts) | ast.Or(parts):
+            for each in parts:
+                yield from _compared(each)
+        case ast.Imply(premise, conclusion):
+            yield from (*_compared(premise), *_compared(conclusion))
+        case _:
+            return
+
+
+def _numbers(expression: ast.NumericExpression) -> Iterator[str]:
+    """The functions in an expression."""
+    match expression:
+        case ast.FluentRef(name):
+            yield name.key
+        case ast.Arithmetic(_, operands):
+            for operand in operands:
+                yield from _numbers(operand)
+        case _:
+            return
+
+
+def _changed_numbers(effect: ast.Effect) -> Iterator[str]:
+    """The functions that an effect may change."""
+    match effect:
+        case ast.FluentEffect(_, fluent):
+            yield fluent.name.key
+        case ast.EffectAnd(parts) | ast.OneOf(parts):
+            for part in parts:
+                yield from _changed_numbers(part)
+        case ast.When(_, part) | ast.EffectForall(_, part):
+            yield from _changed_numbers(part)
+        case ast.Probabilistic(branches):
+            for branch in branches:
+                yield from _changed_numbers(branch.effect)
+        case _:
+            return
 
 
 # --- what takes concurrency ----------------------------------------------------------------------

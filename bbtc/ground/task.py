@@ -6,7 +6,7 @@ and costs are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -15,51 +15,16 @@ from typing import Literal, TypeAlias
 from bbtc.diagrams import Diagram
 from bbtc.durations import INSTANT, Duration, meanwhile
 from bbtc.ground.condition import Condition
+from bbtc.ground.variables import Digit as Digit
+from bbtc.ground.variables import NumberVariable as NumberVariable
+from bbtc.ground.variables import Variable as Variable
+from bbtc.ground.variables import digit_name as digit_name
+from bbtc.ground.variables import ground_name as ground_name
+from bbtc.ground.variables import numbers_of as numbers_of
+from bbtc.ground.variables import split_name as split_name
+from bbtc.ground.variables import unused_name as unused_name
 from bbtc.kleene import Truth
 from bbtc.source import Span
-
-
-def ground_name(symbol: str, args: tuple[str, ...]) -> str:
-    """``symbol(arg,…)``: the name of a ground predicate, action or template."""
-    return f"{symbol}({','.join(args)})"
-
-
-def split_name(name: str) -> tuple[str, tuple[str, ...]]:
-    """Symbol and arguments of a ground name, as far as the name alone tells: what it says of one
-    that :func:`ground_name` made of words with commas or brackets in them need not be right."""
-    symbol, _, rest = name.partition("(")
-    inner = rest.removesuffix(")")
-    return symbol, tuple(inner.split(",")) if inner else ()
-
-
-def unused_name(name: str, taken: Collection[str]) -> str:
-    """The name, made longer if it is taken."""
-    while name in taken:
-        name += "-"
-    return name
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
-    others change it, of whom the task knows nothing."""
-
-    predicate: str
-    args: tuple[str, ...]
-    three_valued: bool
-    hidden: bool = False
-    span: Span | None = field(default=None, compare=False, repr=False)
-    external: bool = False
-
-    @property
-    def name(self) -> str:
-        """``predicate(arg,…)``."""
-        return ground_name(self.predicate, self.args)
-
-    @property
-    def values(self) -> tuple[Truth, ...]:
-        """The values it can take."""
-        return (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN) if self.three_valued else (Truth.TRUE, Truth.FALSE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +45,33 @@ class Charge:
 
 
 @dataclass(frozen=True, slots=True)
+class Case:
+    """What a number becomes where ``when`` is true before the action (None: always): the ``amount``, counted
+    from the number's least value, or that much more than it was, no further than to its bounds."""
+
+    when: Condition | None
+    kind: Literal["assign", "add"]
+    amount: int
+
+
+@dataclass(frozen=True, slots=True)
+class NumberChange:
+    """What happens to the number with these digits: at most one of the cases is so."""
+
+    digits: tuple[int, ...]
+    cases: tuple[Case, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """One thing that may happen, with its probability within its factor.
 
     ``factors`` are further independent choices made if this outcome happens (chance nested in
     a branch). ``reward`` is what the outcome adds to the reward fluent, ``cost`` what it adds to the
     action's cost; ``charges`` add to both under conditions.
+
+    ``changes`` tell what happens to numbers, each of which has at most one in what happens at once. The
+    effects do the same to their digits: whoever reads changes leaves out what effects set of digits.
     """
 
     probability: Fraction
@@ -96,6 +82,7 @@ class Outcome:
     charges: tuple[Charge, ...] = ()
     timed_out: bool = False
     """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
+    changes: tuple[NumberChange, ...] = ()
 
     @property
     def does_something(self) -> bool:
@@ -337,7 +324,7 @@ class Signature:
     """The parameter names of a predicate or an action schema, as declared, without ``?``. They name
     the ports and arguments of exported leaves; where a task has none, exporters number them."""
 
-    kind: Literal["predicate", "action"]
+    kind: Literal["predicate", "action", "function"]
     symbol: str
     parameters: tuple[str, ...]
 
@@ -394,6 +381,21 @@ class Task:
     def variable_index(self) -> dict[str, int]:
         """Index of each variable by name."""
         return {variable.name: index for index, variable in enumerate(self.variables)}
+
+    @cached_property
+    def numbers(self) -> tuple[NumberVariable, ...]:
+        """The numbers, in the order of their first digits."""
+        return numbers_of(self.variables)
+
+    @cached_property
+    def number_by_name(self) -> dict[str, NumberVariable]:
+        """Each number by its name."""
+        return {number.name: number for number in self.numbers}
+
+    @cached_property
+    def number_of_digit(self) -> dict[int, NumberVariable]:
+        """By variable that is a digit: its number."""
+        return {digit: number for number in self.numbers for digit in number.digits}
 
     @cached_property
     def action_by_name(self) -> dict[str, GroundAction]:
@@ -476,7 +478,7 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     for outcome in outcomes:
         key = (
             *(outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges),
-            outcome.timed_out,
+            *(outcome.timed_out, outcome.changes),
         )
         before = merged.get(key)
         if before is not None:

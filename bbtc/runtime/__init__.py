@@ -30,6 +30,15 @@ from bbtc.runtime.nodes import (
     skipper,
     until_success,
 )
+from bbtc.runtime.numbers import (
+    MovingNumberWorld,
+    NumberBeliefs,
+    NumberWorld,
+    Shift,
+    Values,
+    between,
+    on_numbers,
+)
 from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
 __all__ = [
@@ -42,11 +51,15 @@ __all__ = [
     "Latch",
     "Monitor",
     "Move",
+    "MovingNumberWorld",
     "MovingWorld",
+    "NumberBeliefs",
+    "NumberWorld",
     "Outcome",
     "Part",
     "Retry",
     "Rounds",
+    "Shift",
     "Skipper",
     "State",
     "StopOutside",
@@ -55,6 +68,7 @@ __all__ = [
     "Test",
     "Try",
     "UntilSuccess",
+    "Values",
     "Walk",
     "When",
     "WithBeliefs",
@@ -63,11 +77,13 @@ __all__ = [
     "World",
     "all_of",
     "any_of",
+    "between",
     "draw",
     "fallback",
     "happen",
     "in_words",
     "negated",
+    "on_numbers",
     "retry",
     "run",
     "sequence",

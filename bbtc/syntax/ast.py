@@ -37,11 +37,13 @@ from bbtc.syntax.formulas import Unsupported as Unsupported
 from bbtc.syntax.formulas import When as When
 from bbtc.syntax.terms import Arithmetic as Arithmetic
 from bbtc.syntax.terms import Atom as Atom
+from bbtc.syntax.terms import Comparison as Comparison
 from bbtc.syntax.terms import Empty as Empty
 from bbtc.syntax.terms import Equality as Equality
 from bbtc.syntax.terms import FluentRef as FluentRef
 from bbtc.syntax.terms import Name as Name
 from bbtc.syntax.terms import Number as Number
+from bbtc.syntax.terms import NumberRange as NumberRange
 from bbtc.syntax.terms import NumericExpression as NumericExpression
 from bbtc.syntax.terms import Term as Term
 from bbtc.syntax.terms import TypedGroup as TypedGroup
@@ -93,12 +95,13 @@ class Predicates:
 
 @dataclass(frozen=True, slots=True)
 class FunctionDeclaration:
-    """``(name params) - type`` within ``:functions``."""
+    """``(name params) - type`` within ``:functions``, or with a range as its type."""
 
     name: Name
     parameters: TypedList
     types: tuple[Name, ...]
     span: Span = span_field()
+    range: NumberRange | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,7 @@ from bbtc.syntax.fields import (
     Sensed,
     Timeout,
     TimeoutProbability,
+    observed,
 )
 from bbtc.syntax.leaves import Misuse
 
@@ -68,6 +69,13 @@ class Types(NamedTuple):
     """``- type`` or ``- (either type…)`` behind names."""
 
     names: tuple[ast.Name, ...]
+    span: Span
+
+
+class NumberRange(NamedTuple):
+    """``- (int low high)`` behind a function, with what it spans."""
+
+    range: ast.NumberRange
     span: Span
 
 
@@ -172,12 +180,22 @@ class Builder(Expressions):
         return ast.Functions(tuple(declarations), head.to(close))
 
     def function(
-        self, head: Token, parameters: ast.TypedList, close: Token, types: Types | None = None
+        self,
+        head: Token,
+        parameters: ast.TypedList,
+        close: Token,
+        types: Types | NumberRange | None = None,
     ) -> _Function:
         return _function(next(leaves.names(head)), parameters, head.to(close), types)
 
-    def function_bare(self, name: Token, types: Types | None = None) -> _Function:
+    def function_bare(self, name: Token, types: Types | NumberRange | None = None) -> _Function:
         return _function(leaves.name(name), (), name.span, types)
+
+    def number_range(self, dash: Token, head: Token, low: Token, high: Token, *rest: Token) -> NumberRange:
+        policy = leaves.name(rest[0]) if len(rest) > 1 else None
+        span = head.to(rest[-1])
+        given = ast.NumberRange(self.number(low), self.number(high), policy, span)
+        return NumberRange(given, dash.to(rest[-1]))
 
     # --- actions and the like ----------------------------------------------------------------
 
@@ -335,10 +353,10 @@ class Builder(Expressions):
         return TimeoutProbability(keyword, self.number(number))
 
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
-        return Observe(keyword, _observed(formulas))
+        return Observe(keyword, observed(formulas))
 
     def sensed(self, keyword: Token, formulas: list[ast.Formula]) -> Sensed:
-        return Sensed(keyword, _observed(formulas))
+        return Sensed(keyword, observed(formulas))
 
     def sensed_noisy(self, keyword: Token, content: ast.Probabilistic) -> Sensed:
         return Sensed(keyword, ast.Observation(content, content.span))
@@ -542,13 +560,6 @@ def _seconds(head: Token, operand: Operand) -> ast.NumericExpression:
     return expression
 
 
-def _observed(formulas: list[ast.Formula]) -> ast.Observation:
-    first, last = formulas[0].span, formulas[-1].span
-    span = Span(first.source, first.start, last.end)
-    content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
-    return ast.Observation(content, span)
-
-
 def _state_variable(
     head: Token, name: ast.Name, parameters: ast.TypedList | None, values: list[ast.Formula], close: Token
 ) -> ast.StateVariable:
@@ -572,11 +583,15 @@ def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: b
     return ast.PredicateDeclaration(leaves.declared("predicate", name), parameters, unknown, span)
 
 
-def _function(name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | None) -> _Function:
+def _function(
+    name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | NumberRange | None
+) -> _Function:
     declared = leaves.declared("function", name)
     if types is None:
         return ast.FunctionDeclaration(declared, parameters, (), span)
     whole = Span(span.source, span.start, types.span.end)
+    if isinstance(types, NumberRange):
+        return ast.FunctionDeclaration(declared, parameters, (), whole, types.range)
     return ast.FunctionDeclaration(declared, parameters, types.names, whole)
 
 

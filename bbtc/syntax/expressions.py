@@ -164,7 +164,7 @@ class Expressions:
 
     def comparison(
         self, head: Token, left: Operand, right: Operand, close: Token
-    ) -> ast.Equality | ast.Unsupported:
+    ) -> ast.Equality | ast.Comparison | ast.Unsupported:
         """The fast form of an equation is :meth:`equation`."""
         if head.kind == "EQUAL":
             first, second = _as_term(left), _as_term(right)
@@ -173,7 +173,10 @@ class Expressions:
                 return ast.Equality(first, second, head.to(close))
             if any(isinstance(side, ast.Name | ast.Variable | ast.Unsupported) for side in (left, right)):
                 return unsupported("object fluent", head, close)
-        return unsupported("numeric comparison", head, close)
+        one, other = numeric(left), numeric(right)
+        if one is None or other is None:
+            return unsupported("comparison of objects", head, close)
+        return ast.Comparison(head.text.lstrip("(").strip(), one, other, head.to(close))
 
     def equation(self, token: Token) -> ast.Equality:
         """The fast form of :meth:`comparison` for ``=`` between a name or variable and another."""

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from bbtc.source import Span
 from bbtc.syntax import ast
 from bbtc.syntax.engine import Token
 from bbtc.syntax.expressions import parameters_of
@@ -129,3 +130,11 @@ class Fields:
     def parameters(self, close: Token) -> ast.TypedList:
         """The parameters of a form that ends with a token."""
         return parameters_of(self.get(Parameters) or (), close)
+
+
+def observed(formulas: list[ast.Formula]) -> ast.Observation:
+    """What ``:observe`` or ``:sensed`` lists."""
+    first, last = formulas[0].span, formulas[-1].span
+    span = Span(first.source, first.start, last.end)
+    content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
+    return ast.Observation(content, span)

@@ -335,9 +335,18 @@ class _Docs:
         # A bare name has no parentheses in the source.
         around = self._parentheses(node.span.start, last, node.span) or node.name.span
         head = Doc(f"({node.name.text}", self.groups(node.parameters), ")", around, filled=True)
+        if node.range is not None:
+            return Doc("", (head, self.range(node.range, around.end, node.span)), "", node.span, filled=True)
         if not node.types:
             return head
         return Doc("", (head, self.types(node.types, around.end, node.span)), "", node.span, filled=True)
+
+    def range(self, node: ast.NumberRange, after: int, span: Span) -> Doc:
+        """``- (int low high)``."""
+        dash = self._word("-", after, span) or node.span
+        policy = () if node.policy is None else (_leaf(node.policy),)
+        kind = Doc("(int", (_number(node.low), _number(node.high), *policy), ")", node.span, glued=3)
+        return Doc("-", (kind,), "", Span(span.source, dash.start, node.span.end), glued=1)
 
     # --- problems ----------------------------------------------------------------------------
 
@@ -376,6 +385,9 @@ class _Docs:
                 return Doc("(", (), ")", node.span)
             case ast.Equality():
                 return Doc("(=", (_leaf(node.left), _leaf(node.right)), ")", node.span, glued=2)
+            case ast.Comparison():
+                numbers = (self.expression(node.left), self.expression(node.right))
+                return Doc(f"({node.operator}", numbers, ")", node.span, glued=2)
             case ast.Not():
                 return Doc("(not", (self.formula(node.part),), ")", node.span, glued=1)
             case ast.And():

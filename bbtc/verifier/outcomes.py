@@ -23,12 +23,14 @@ from bbtc.ground.task import (
     Factor,
     GroundAction,
     GroundEvent,
+    NumberChange,
+    Outcome,
     Task,
     charges_of,
     effects_of,
     outcomes_of,
 )
-from bbtc.verifier.conditions import FALSE, TRUE, UNKNOWN, where_true
+from bbtc.verifier.conditions import FALSE, TRUE, UNKNOWN, Cells, where_true
 from bbtc.verifier.program import (
     NO,
     YES,
@@ -38,6 +40,7 @@ from bbtc.verifier.program import (
     Choose,
     Command,
     Compare,
+    Count,
     Drafting,
     Expression,
     Update,
@@ -53,7 +56,9 @@ MOST_BRANCHES = 64
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _Amounts: TypeAlias = tuple[Fraction, Fraction, Fraction]  # actions, cost, reward
 _Rounds: TypeAlias = tuple[tuple[GroundEvent, ...], ...]
-Drawn: TypeAlias = tuple[Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction]
+Drawn: TypeAlias = tuple[
+    Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction, tuple[NumberChange, ...]
+]
 
 
 def relevant(task: Task, actions: Iterable[GroundAction], read: Iterable[int]) -> list[int]:
@@ -98,6 +103,7 @@ class Outcomes:
         default_factory=dict
     )  # by action, the first stage of what happens after it
     _pending: dict[int, int] = field(default_factory=dict)
+    _notes: dict[int, int] = field(default_factory=dict)  # those of numbers, by cell
     _entry: dict[str, int] = field(default_factory=dict)
 
     def prepare(self, actions: Sequence[GroundAction], task: Task) -> None:
@@ -118,6 +124,9 @@ class Outcomes:
         touched = {v for effect in effects_of(drawn) for v, _ in effect.sets}
         for variable in sorted(touched & self.cell_of.keys()):
             of = self.draft.cells[self.cell_of[variable]]
+            if of.kind == "number":
+                self._pending[variable] = self._note_of(self.cell_of[variable])
+                continue
             self._pending[variable] = self.draft.cell(
                 Cell("pending", of.subject, "what it becomes: 0 as it is, 1 false, 2 unknown, 3 true", 3)
             )
@@ -147,11 +156,25 @@ class Outcomes:
         rounds = (tuple(filter(self._matters, events)) for events in task.rounds(action))
         return tuple(events for events in rounds if events)
 
+    def _note_of(self, number: int) -> int:
+        """The pending cell of a number."""
+        if number not in self._notes:
+            of = self.draft.cells[number]
+            meaning = "what it becomes: 0 as it is, else one more than that"
+            self._notes[number] = self.draft.cell(Cell("pending", of.subject, meaning, of.highest + 1))
+        return self._notes[number]
+
     def _apply(self, stage: int, after: int, remark: str) -> None:
         """What is noted is set in one stage, then comes another."""
         assert self.stage is not None
-        apply = [applied(self.cell_of[v], p) for v, p in self._pending.items()]
-        clear = [put(pending, 0) for pending in self._pending.values()]
+        notes = {self.cell_of[variable]: pending for variable, pending in self._pending.items()}
+        apply = [
+            Count(cell, note, ((none_of(Compare(note, "=", 0)), "add", -1),), self.draft.cells[cell].highest)
+            if cell in self._notes
+            else applied(cell, note)
+            for cell, note in notes.items()
+        ]
+        clear = [put(note, 0) for note in notes.values()]
         branch = Branch(_ONE, (*apply, *clear, put(self.stage, after)), (_ZERO, _ZERO, _ZERO))
         self.commands.append(Command(None, Compare(self.stage, "=", stage), (branch,), remark))
 
@@ -219,10 +242,11 @@ class Outcomes:
             assert self.stage is not None
             updates = (*updates, put(self.stage, self._events[action.name]))
         merged: dict[tuple[tuple[Update, ...], _Amounts, tuple[Charged, ...]], Fraction] = {}
-        for probability, effects, charges, cost, reward in draws(action.factors):
+        for probability, effects, charges, cost, reward, changes in draws(action.factors):
             if probability:
                 amounts = (_ONE, action.cost + cost, reward)
-                key = ((*updates, *self._set(effects)), amounts, charged(charges, self.cell_of))
+                sets = (*self._set(effects), *self._count(changes))
+                key = ((*updates, *sets), amounts, charged(charges, self.cell_of))
                 merged[key] = merged.get(key, _ZERO) + probability
         return tuple(
             Branch(p, changed, amounts, charges) for (changed, amounts, charges), p in merged.items()
@@ -241,6 +265,28 @@ class Outcomes:
                     break
             yield Choose(self.cell_of[variable], tuple(cases))
 
+    def _count(self, changes: Iterable[NumberChange]) -> Iterator[Update]:
+        """What happens to numbers."""
+        for change in changes:
+            cell = self.cell_of.get(change.digits[0])
+            if cell is not None:
+                yield self._counted(change, cell, cell, 0)
+
+    def _counted(self, change: NumberChange, cell: int, source: int, shift: int) -> Count:
+        cases = tuple(
+            (YES if case.when is None else where_true(case.when, self.cell_of), case.kind, case.amount)
+            for case in change.cases
+        )
+        return Count(cell, source, cases, self.draft.cells[source].highest, shift)
+
+    def _noted(self, outcome: Outcome) -> Iterator[Update]:
+        """Notes in *pending* cells what an outcome does."""
+        yield from noted(outcome.effects, self.cell_of, self._pending)
+        for change in outcome.changes:
+            source = self.cell_of.get(change.digits[0])
+            if source is not None:
+                yield self._counted(change, self._pending[change.digits[0]], source, 1)
+
     # --- in stages ----------------------------------------------------------------------------
 
     def _series(self, factors: Sequence[Factor], after: int) -> int:
@@ -255,7 +301,7 @@ class Outcomes:
         for outcome in factor.outcomes:
             if outcome.probability:
                 then = put(self.stage, self._series(outcome.factors, after))
-                updates = (*noted(outcome.effects, self.cell_of, self._pending), then)
+                updates = (*self._noted(outcome), then)
                 amounts = (_ZERO, outcome.cost, outcome.reward)
                 charges = charged(outcome.charges, self.cell_of)
                 branches.append(Branch(outcome.probability, updates, amounts, charges))
@@ -305,7 +351,11 @@ def _guards(effects: Sequence[Effect], cell_of: Mapping[int, int]) -> dict[int, 
     """Of each variable with a cell that is set: where it is set to false, to unknown, to true."""
     found: dict[int, list[Expression]] = {}
     for effect in effects:
-        sets = [(variable, value) for variable, value in effect.sets if variable in cell_of]
+        sets = [
+            (variable, value)
+            for variable, value in effect.sets
+            if variable in cell_of and not (isinstance(cell_of, Cells) and variable in cell_of.numbers)
+        ]
         when = where_true(effect.when, cell_of) if effect.when is not None and sets else YES
         for variable, value in sets if when != NO else ():
             guards = found.setdefault(variable, [NO, NO, NO])
@@ -322,18 +372,19 @@ def combinations(factors: Sequence[Factor]) -> int:
 
 
 def draws(factors: Sequence[Factor]) -> Iterator[Drawn]:
-    """Every combination of outcomes: probability, effects, charges, cost, reward."""
+    """Every combination of outcomes: probability, effects, charges, cost, reward, changes of numbers."""
     if not factors:
-        yield _ONE, (), (), _ZERO, _ZERO
+        yield _ONE, (), (), _ZERO, _ZERO, ()
         return
     *before, last = factors
-    for p, effects, charges, cost, reward in draws(before):
+    for p, effects, charges, cost, reward, changes in draws(before):
         for outcome in last.outcomes:
-            for p2, effects2, charges2, cost2, reward2 in draws(outcome.factors):
+            for p2, effects2, charges2, cost2, reward2, changes2 in draws(outcome.factors):
                 yield (
                     p * outcome.probability * p2,
                     (*effects, *outcome.effects, *effects2),
                     (*charges, *outcome.charges, *charges2),
                     cost + outcome.cost + cost2,
                     reward + outcome.reward + reward2,
+                    (*changes, *outcome.changes, *changes2),
                 )

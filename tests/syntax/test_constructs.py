@@ -70,6 +70,7 @@ def action(text: str) -> ast.Action:
     return found
 
 
+ENERGY = ast.FluentRef(name("energy"), (term("?r"),), S)
 CONDITIONS: dict[str, ast.Formula] = {
     "()": ast.Empty(S),
     "( )": ast.Empty(S),
@@ -101,8 +102,12 @@ CONDITIONS: dict[str, ast.Formula] = {
     "(known ?x)": atom("known ?x"),
     "(unknown a b)": atom("unknown a b"),
     "(condition a)": atom("condition a"),
-    "(>= (energy ?r) 8)": ast.Unsupported("numeric comparison", "(>= (energy ?r) 8)", S),
-    "(= (energy ?r) 8)": ast.Unsupported("numeric comparison", "(= (energy ?r) 8)", S),
+    "(>= (energy ?r) 8)": ast.Comparison(">=", ENERGY, ast.Number("8", S), S),
+    "(= (energy ?r) 8)": ast.Comparison("=", ENERGY, ast.Number("8", S), S),
+    "(< 3 (* 2 (energy ?r)))": ast.Comparison(
+        "<", ast.Number("3", S), ast.Arithmetic("*", (ast.Number("2", S), ENERGY), S), S
+    ),
+    "(> (energy ?r) ?r)": ast.Unsupported("comparison of objects", "(> (energy ?r) ?r)", S),
     "(= (place ?r) hall)": ast.Unsupported("object fluent", "(= (place ?r) hall)", S),
     "(clear (place ?r))": ast.Unsupported("object fluent", "(clear (place ?r))", S),
     "(preference p1\n (and (q)\n r) )": ast.Unsupported("preference", "(preference p1 (and (q) r))", S),

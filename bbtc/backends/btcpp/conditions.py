@@ -3,6 +3,7 @@
 A literal is a leaf: SUCCESS, FAILURE, RUNNING for true, false, unknown. What is built from leaves:
 
 - ``not p``: Inverter, which keeps RUNNING;
+- ``n >= 5``, ``2 <= n <= 5``: the leaf of the number, with the bounds in its ports;
 - ``unknown p``, ``known p``: the leaf with its two other results forced to one, and beside it, in a
   Skipper, the answer for RUNNING; as a BehaviorTree per predicate;
 - ``and``, ``or`` with at most one part that can be unknown: ReactiveSequence, ReactiveFallback with
@@ -22,10 +23,11 @@ from typing_extensions import assert_never
 
 from bbtc.backends.btcpp.idioms import Idioms, decorated
 from bbtc.backends.btcpp.names import BtcppNames, TreeIds, is_numeric, ports_for
-from bbtc.backends.interface import variable_symbol
+from bbtc.backends.interface import BOUNDS, variable_symbol
 from bbtc.backends.names import Symbol
 from bbtc.backends.shape import can_be_unknown, words_of
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, variables
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, variables
+from bbtc.ground.describe import bounds, digit_of
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 
@@ -51,7 +53,7 @@ class ConditionWriter:
                 return sum(can_be_unknown(self._task, part) for part in parts) > 1 or any(
                     self.uses_register(part) for part in parts
                 )
-            case Is() | Known() | Not() | Constant():
+            case Is() | Known() | Within() | Not() | Constant():
                 return False
             case _:
                 assert_never(condition)
@@ -70,7 +72,7 @@ class ConditionWriter:
         match condition:
             case Is(_, Truth.TRUE) | Constant():
                 pass
-            case Is() | Known() | Not() | And() | Or():
+            case Is() | Known() | Within() | Not() | And() | Or():
                 # A SubTree says all in its tag, and its name would have to be unique.
                 if element.tag != "SubTree":
                     element.set("name", self.label(condition, binding))
@@ -124,6 +126,8 @@ class ConditionWriter:
                 return word + self._names.plain[variable_symbol(self._task.variables[variable])]
             case Known(variable):
                 return "Known" + self._names.plain[variable_symbol(self._task.variables[variable])]
+            case Within(digits):
+                return self._names.plain[variable_symbol(self._task.variables[digits[0]])]
             case Not(part):
                 return "Not" + self._title(part)
             case And(parts):
@@ -145,6 +149,8 @@ class ConditionWriter:
                 return self._test("unknown", variable, binding)
             case Known(variable):
                 return self._test("known", variable, binding)
+            case Within():
+                return self._number(condition, binding)
             case Not(part):
                 return decorated("Inverter", self._kleene(part, binding))
             case And(parts):
@@ -176,6 +182,16 @@ class ConditionWriter:
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
         return self._with_ports(Element(self._names.ids[symbol]), symbol, read.args, binding)
+
+    def _number(self, test: Within, binding: Mapping[str, str]) -> Element:
+        """The leaf of a number with what it is compared with; the ends of its range are no bounds."""
+        element = self._leaf(test.digits[0], binding)
+        least, most = bounds(self._task.variables, test.digits, test.low, test.high)
+        digit = digit_of(self._task.variables, test.digits)
+        for port, value, end in zip(BOUNDS, (least, most), (digit.low, digit.high), strict=True):
+            if value != end:
+                element.set(port, str(value))
+        return element
 
     def _test(self, kind: Literal["known", "unknown"], variable: int, binding: Mapping[str, str]) -> Element:
         read = self._task.variables[variable]

@@ -13,7 +13,7 @@ from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, Profile
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
 from bbtc.backends.exporter import Figures, Option, OptionValue
-from bbtc.backends.interface import Leaf, variable_symbol
+from bbtc.backends.interface import BOUNDS, Leaf, variable_symbol
 from bbtc.ground.task import Task
 from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
@@ -53,6 +53,10 @@ def meaning(leaf: Leaf) -> str:
     """What a leaf tells or does, in a sentence."""
     if leaf.symbol.kind == "action":
         return f"Does {signature(leaf)}."
+    if leaf.counts:
+        least, most = BOUNDS
+        compared = f"is no less than {least} and no more than {most}, as far as these are given"
+        return f"SUCCESS where {signature(leaf)} {compared}, else FAILURE; RUNNING where it is unknown."
     unknown = ", RUNNING where it is unknown" if leaf.three_valued else ""
     return f"SUCCESS where {signature(leaf)} is true, FAILURE where it is false{unknown}."
 
@@ -67,7 +71,14 @@ def _entry(
     element = SubElement(model, kind, ID=names.ids[leaf.symbol])
     for port, text in zip(leaf.parameters, _port_text(names, objects, leaf), strict=True):
         SubElement(element, "input_port", name=port, type="std::string").text = text or None
+    for port, text in _bounds(leaf):
+        SubElement(element, "input_port", name=port, type="int").text = text
     SubElement(element, "description").text = meaning(leaf)
+
+
+def _bounds(leaf: Leaf) -> list[tuple[str, str]]:
+    """What a number is compared with, and what is said of that."""
+    return [(BOUNDS[0], "the least value"), (BOUNDS[1], "the greatest value")] if leaf.counts else []
 
 
 def port_code(task: Task, names: BtcppNames, leaf: Leaf) -> str:
@@ -75,6 +86,10 @@ def port_code(task: Task, names: BtcppNames, leaf: Leaf) -> str:
     ports = [
         f"BT::InputPort<std::string>({cppcode.literal(port)}, {cppcode.literal(text)})"
         for port, text in zip(leaf.parameters, _port_text(names, _objects(task), leaf), strict=True)
+    ]
+    ports += [
+        f"BT::InputPort<int>({cppcode.literal(port)}, {cppcode.literal(text)})"
+        for port, text in _bounds(leaf)
     ]
     return f"{{{', '.join(ports)}}}"
 

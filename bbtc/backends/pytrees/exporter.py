@@ -15,10 +15,10 @@ from bbtc.backends.exporter import Figures, Option, OptionValue
 from bbtc.backends.interface import Interface, action_symbol, guard_of, interface_of, variable_symbol
 from bbtc.backends.names import PYTHON_RESERVED, Symbol, identifiers
 from bbtc.backends.pytrees.parts import (
-    CONDITION_TYPE,
     ConditionCode,
     action_summary,
     condition_summary,
+    condition_type,
     fact_tuple,
     harmless,
     method,
@@ -88,7 +88,7 @@ class _Writer:
         self.claim = tree.success_probability
         self.root = fit(tree.root, "py_trees")
         self.names = py_trees_names(tree)
-        self.conditions = ConditionCode()
+        self.conditions = ConditionCode(tree.task.variables)
         self.world = WorldWriter(tree, self.names.interface, self.names.methods, self.conditions)
         self.branches: list[list[str]] = []
         retries = [node for node, _ in retries_of(self.root)]
@@ -109,7 +109,7 @@ class _Writer:
             used = needed(used)
             nodes = [*copied("nodes", used), *copied("limits", used)]
             world, head = copied("world", used), imports(used)
-            world += [*copied("monitor", used), *copied("moving", used)]
+            world += [*copied("monitor", used), *copied("moving", used), *copied("numbers", used)]
         else:
             nodes, world, head = [], [], imports(used, ("bbtc.runtime", defined(used)))
             head += ["", _PUBLIC if self.monitor is None else _PUBLIC_HIDDEN]
@@ -142,17 +142,18 @@ class _Writer:
         methods = self.names.methods
         lines = (_PROTOCOL if self.monitor is None else _PROTOCOL_HIDDEN).splitlines()
         for leaf in self.names.interface.asked:
-            lines += method(methods[leaf.symbol], leaf, CONDITION_TYPE, condition_summary(leaf))
+            lines += method(methods[leaf.symbol], leaf, condition_type(leaf), condition_summary(leaf))
         for leaf in self.names.interface.actions:
             lines += method(methods[leaf.symbol], leaf, "Status", action_summary(leaf))
         return lines
 
     def _reads(self) -> list[str]:
         interface = self.names.interface
-        table = mapping(
+        reads = dict.fromkeys(
             (fact_tuple(variable), str(interface.leaves[variable_symbol(variable)].three_valued))
             for variable in map(self.task.variables.__getitem__, interface.reads)
         )
+        table = mapping(reads)
         return [
             *layout(table, "READS: dict[Fact, bool] = "),
             '"""The facts that the tree reads, and whether they can be unknown."""',

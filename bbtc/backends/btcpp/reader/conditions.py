@@ -103,6 +103,8 @@ class ConditionReader(Generic[S]):
             condition = kind((yield self._parts(element, scope, level + 1, registered=registered)))
             if not has(element, "Parallel"):
                 self._check_order(element, condition)
+        elif self._leaves.is_number(element) and not element.children:
+            condition = self._leaves.number(element, scope.ports)
         elif self._leaves.is_leaf(element) and not element.children:
             condition = Is(self._leaves.variable(element, scope.ports), Truth.TRUE)
         else:
