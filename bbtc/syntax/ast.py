@@ -127,7 +127,6 @@ class Action:
     uninterruptible: bool = False
     during: Formula | None = None
     on_abort: Effect | None = None
-
     timing: Timing | None = None
 
 
