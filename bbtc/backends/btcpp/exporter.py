@@ -17,7 +17,7 @@ from bbtc.backends.btcpp.conditions import ConditionWriter
 from bbtc.backends.btcpp.holding import Holding, Ports
 from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile, forgotten, full_again
 from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
-from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE, condition_below, notes, template_label
+from bbtc.backends.btcpp.notes import CLAIM, DIGITS, TEMPLATE, condition_below, notes, template_label
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.backends.btcpp.palette import node_model
 from bbtc.backends.commitment import Fact, facts_read
@@ -26,6 +26,7 @@ from bbtc.backends.interface import action_symbol, guard_of, variable_symbol
 from bbtc.backends.shape import fit, written
 from bbtc.ground.condition import TRUE, And, Condition, Or, variables
 from bbtc.ground.task import GroundAction, Task, ground_name, split_name
+from bbtc.rounding import brief
 from bbtc.tree.deep import Deep, unwind
 from bbtc.tree.nodes import (
     ActionNode,
@@ -139,7 +140,7 @@ class _Writer:
         return document
 
     def _headline(self) -> str:
-        task, claim = self.task, self.tree.success_probability
+        task, claim = self.task, brief(self.tree.success_probability, DIGITS)
         unbounded = " Nothing bounds how often it tries." if tries_without_end(self.tree.root) else ""
         return shown(f"{task.domain}, {task.problem}: {CLAIM}{claim}.{unbounded} Made by bbtc.")
 

@@ -32,6 +32,7 @@ from bbtc.backends.shape import fit, normal, words_of
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
 from bbtc.printable import printable
+from bbtc.rounding import brief
 from bbtc.tree.nodes import (
     ActionNode,
     ConditionNode,
@@ -86,7 +87,7 @@ class _Writer:
         self.embedded = embedded
         self.task: Task = tree.task
         self.monitor = tree.monitor
-        self.claim = tree.success_probability
+        self.claim = brief(tree.success_probability)
         self.root = fit(tree.root, "py_trees")
         self.names = py_trees_names(tree)
         self.conditions = ConditionCode(tree.task.variables)

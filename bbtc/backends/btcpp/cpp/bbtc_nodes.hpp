@@ -29,7 +29,8 @@ struct Commitment {
 };
 
 /// Around a condition: what it returned before the running action began, if that may set it; else what it
-/// returns. It is known by its id and its ports in the order of their names: "At(place=hall)".
+/// returns. It is known by its id and those of its ports that tell more than their default, in the order of
+/// their names: "At(place=hall)".
 class Held : public BT::DecoratorNode {
  public:
   Held(const std::string& name, const BT::NodeConfig& config) : BT::DecoratorNode(name, config) {}
@@ -40,7 +41,10 @@ class Held : public BT::DecoratorNode {
     const BT::TreeNode& leaf = *child();
     std::map<std::string, std::string> ports;
     for (const auto& [port, value] : leaf.config().input_ports) {
-      ports[port] = leaf.getInput<std::string>(port).value();
+      const std::string given = leaf.getInput<std::string>(port).value();
+      if (given != leaf.config().manifest->ports.at(port).defaultValueString()) {
+        ports[port] = given;
+      }
     }
     std::string text = leaf.registrationName() + "(";
     for (const auto& [port, value] : ports) {

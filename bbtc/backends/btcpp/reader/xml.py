@@ -26,7 +26,7 @@ from bbtc.backends.btcpp.idioms import (
     milliseconds,
 )
 from bbtc.backends.btcpp.names import is_numeric, shown, without_number
-from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE
+from bbtc.backends.btcpp.notes import CLAIM, DIGITS, TEMPLATE
 from bbtc.backends.btcpp.reader.conditions import ConditionReader
 from bbtc.backends.btcpp.reader.holding import Holds
 from bbtc.backends.btcpp.reader.layout import Layout, is_port
@@ -66,7 +66,7 @@ from bbtc.tree.validate import MAX_DEPTH, tree_problems
 _MOST_FAULTS = 50
 _MOST_READ = 30  # elements of a file for each node that a tree may have
 _REASON = "for "
-_TOLD = re.compile(rf"{re.escape(CLAIM)}([0-9]{{1,300}}(?:/0*[1-9][0-9]{{0,299}})?)(?![0-9/])")
+_TOLD = re.compile(rf"{re.escape(CLAIM)}([0-9]{{1,{DIGITS}}}(?:/0*[1-9][0-9]{{0,{DIGITS - 1}}})?)(?![0-9/])")
 
 _HINTS = {
     "Sequence": "it has memory; a tree reads its conditions in every tick: use ReactiveSequence",
