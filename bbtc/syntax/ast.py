@@ -125,7 +125,6 @@ class Action:
     repeats: bool = False
     during: Formula | None = None
     on_abort: Effect | None = None
-
     timing: Timing | None = None
 
 

@@ -79,8 +79,8 @@ CONSTRUCTS: dict[str, Callable[[Path], bool]] = {
     "`:exogenous`": _last(ast.Exogenous),
     "`:per second`": _last(ast.Exogenous, lambda node: node.per is not None and node.per.key == "second"),
     "`:while`": _last(ast.Action, lambda node: node.during is not None),
-    "`:duration`": _last(ast.Action, lambda node: node.duration is not None),
-    "`:timeout`": _last(ast.Action, lambda node: node.timeout is not None),
+    "`:duration`": _last(ast.Timing, lambda node: node.duration is not None),
+    "`:timeout`": _last(ast.Timing, lambda node: node.timeout is not None),
     "numbers as state": _last(ast.FunctionDeclaration, lambda node: node.range is not None),
     "action costs": _last(ast.FluentEffect, lambda node: node.fluent.name.key == "total-cost"),
     "cost of one outcome": _inside(
