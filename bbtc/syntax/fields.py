@@ -141,6 +141,7 @@ def observed(formulas: list[ast.Formula]) -> ast.Observation:
 
 
 def timing_of(fields: Fields, span: Span) -> ast.Timing | None:
+    """What the fields of an action say of time, if anything."""
     duration, timeout = fields.get(Duration), fields.get(Timeout)
     chance, effect = fields.get(TimeoutProbability), fields.get(OnTimeout)
     given = any(each is not None for each in (duration, timeout, chance, effect))
