@@ -23,7 +23,7 @@ from bbtc.planner.result import Plan
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ConditionNode
 from tests.cli.program import bbtc as program
-from tests.long_form import amount
+from tests.long_form import LONG, amount
 from tests.timing.test_curve import domain_text
 
 F = Fraction
@@ -176,6 +176,27 @@ def test_a_task_without_durations_knows_no_deadline(tmp_path: Path) -> None:
     )
     done = program("plan", str(file), "--deadline", "5")
     assert (done.returncode, "BBT0446" in done.stderr) == (1, True)
+
+
+@pytest.mark.skipif(not LONG, reason="takes 10 s of processor time: part of the long form")
+@pytest.mark.parametrize(
+    ("problem", "seconds"), [("along-the-corridor", 100), ("letter-upstairs", 150), ("nearly-empty", 200)]
+)
+def test_a_deadline_pays_in_the_building(problem: str, seconds: int) -> None:
+    task = bbtc.compile("domains/building/domain.pddl", f"domains/building/{problem}.pddl")
+    base = deadlines.judged(bbtc.plan(task), F(seconds), Limits())
+    found = deadlines.plan_by(
+        task,
+        F(seconds),
+        pipeline.plan_task,
+        None,
+        Limits(seconds=120),
+        strategy="auto",
+        progress=lambda _: None,
+        options=Options(),
+    )
+    assert base.tree.success_by is not None
+    assert found.by.at_least > base.tree.success_by.at_most
 
 
 def test_backward_induction_counts_steps() -> None:
