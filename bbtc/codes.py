@@ -145,6 +145,7 @@ _CODES = (
     Code("BBT0430", "too much for the text of a partially observable process"),
     Code("BBT0431", "true world that cannot be", _WARNING),
     Code("BBT0432", "reading that tells nothing, or the contrary"),
+    Code("BBT0433", "file that does not hold what an action may set", _WARNING),
     Code("BBT0437", "range of a number"),
     Code("BBT0438", "number without a bound"),
     Code("BBT0439", "number outside its range at the start"),

@@ -17,6 +17,7 @@ from bbtc.runtime.nodes import (
     StopWhenBlocked,
     Try,
     UntilSuccess,
+    View,
     WithBeliefs,
     WithSetup,
     all_of,
@@ -29,6 +30,7 @@ from bbtc.runtime.nodes import (
     sequence,
     skipper,
     until_success,
+    view,
 )
 from bbtc.runtime.numbers import (
     MovingNumberWorld,
@@ -69,6 +71,7 @@ __all__ = [
     "Try",
     "UntilSuccess",
     "Values",
+    "View",
     "Walk",
     "When",
     "WithBeliefs",
@@ -90,6 +93,7 @@ __all__ = [
     "simulate",
     "skipper",
     "until_success",
+    "view",
     "watched",
     "within",
 ]

@@ -47,6 +47,7 @@ from bbtc.syntax.fields import (
     Sensed,
     Timeout,
     TimeoutProbability,
+    Uninterruptible,
     observed,
     timing_of,
 )
@@ -211,6 +212,7 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            fields.get(Uninterruptible) is True,
             fields.get(During),
             fields.get(OnAbort),
             timing_of(fields, head.to(close)),
@@ -288,6 +290,9 @@ class Builder(Expressions):
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
+
+    def uninterruptible(self, keyword: Token) -> Uninterruptible:
+        return Uninterruptible(keyword, True)
 
     def durative_action(
         self, head: Token, name: Token, given: list[Field[object]], close: Token
