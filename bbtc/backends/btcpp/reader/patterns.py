@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.backends.btcpp.idioms import COMMITTED, HELD, HOLD_LABEL, LATCH, SKIPPER, TIMEOUT, UNTIL_SUCCESS
+from bbtc.backends.btcpp.idioms import COMMITTED, HELD, HOLD_LABEL, LATCH, SKIPPER, UNTIL_SUCCESS
 from bbtc.backends.btcpp.reader.xmltext import XmlElement
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
@@ -290,19 +290,6 @@ NOT_COMMITTED = Shape(
     ),
 )
 """The same of files in which nothing is held while an action runs."""
-
-GIVEN_UP = Shape(
-    "ForceSuccess",
-    {},
-    (
-        Shape(
-            TIMEOUT,
-            {"msec": Pattern(re.compile("(?P<msec>[0-9]{1,13})"), "30000")},
-            (Hole("leaf"),),
-        ),
-    ),
-)
-"""An action that is given up after some time, which counts as its end."""
 
 RETRY = Shape(
     "ReactiveSequence",

@@ -23,7 +23,6 @@ from bbtc.backends.btcpp.idioms import (
     forgotten,
     full_again,
     is_retry_label,
-    milliseconds,
 )
 from bbtc.backends.btcpp.names import is_numeric, shown, without_number
 from bbtc.backends.btcpp.notes import CLAIM, DIGITS, TEMPLATE
@@ -31,9 +30,9 @@ from bbtc.backends.btcpp.reader.conditions import ConditionReader
 from bbtc.backends.btcpp.reader.holding import Holds
 from bbtc.backends.btcpp.reader.layout import Layout, is_port
 from bbtc.backends.btcpp.reader.leaves import Leaves
+from bbtc.backends.btcpp.reader.limits import GIVEN_UP, check_limit
 from bbtc.backends.btcpp.reader.notes import Notes, read_notes, with_notes
 from bbtc.backends.btcpp.reader.patterns import (
-    GIVEN_UP,
     NOT_COMMITTED,
     READ,
     REGISTER,
@@ -526,7 +525,8 @@ class _Reader:
         else:
             message, hint = self._no_counterpart(leaf)
             raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
-        self._check_limit(leaf, None if limited is None else limited.texts["msec"], name)
+        found = None if limited is None else limited.texts["msec"]
+        check_limit(self._document, leaf, found, self._task.action_by_name[name])
         self._check_entries(element, parts, name, inside)
         guarded = yield self._guarded(parts, name, inside)
         held = [fact for note in parts.notes for fact in self._conditions.note(note, inside)]
@@ -544,20 +544,6 @@ class _Reader:
             label = without_number(label)
         own = label if label and label != shown(auto) else None
         return ActionNode("", name, parts.latched, bool(guarded), own)
-
-    def _check_limit(self, leaf: XmlElement, found: str | None, name: str) -> None:
-        """An action is given up when the task says so, which its figures rest on."""
-        seconds = self._task.action_by_name[name].timeout
-        wanted = None if seconds is None else str(milliseconds(seconds))
-        if found == wanted:
-            return
-        if wanted is None:
-            message = f"'{clip(name)}' is given up after {found} ms, and has no time-out in the task"
-            hint = "say so in the domain: `:timeout`, in seconds"
-        else:
-            message = f"'{clip(name)}' has to be given up after {wanted} ms"
-            hint = f'<ForceSuccess><Timeout msec="{wanted}">…</Timeout></ForceSuccess> does so'
-        raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
 
     def _check_entries(self, element: XmlElement, parts: ActionParts, name: str, inside: Scope) -> None:
         """The entries of the blackboard through which an action speaks with the rest of the tree."""
