@@ -152,7 +152,11 @@ class CompiledReplay:
 
     def run(self, script: Script, timing: Timing = "between") -> Run:
         """Replay one script in a new instance of the tree."""
-        world = self.world = ScriptedWorld(self._task, script, timing)
+        return self.run_in(ScriptedWorld(self._task, script, timing))
+
+    def run_in(self, world: ScriptedWorld) -> Run:
+        """What a new instance of the tree does in a world."""
+        self.world = world
         if self._waiting:
             self._answer("0")
         for _ in range(world.most_ticks()):
