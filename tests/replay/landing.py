@@ -13,8 +13,8 @@ from tests.replay.compiled import CompiledReplay
 from tests.replay.reference import set_by
 
 MOMENTS = 6
-"""In the call that starts the action, after that tick, in the next call, after that, in the call that ends it,
-and after that, before the next tick."""
+"""In the call that starts the action, after that tick, in the next call, after that, in the call that ends
+it, and after that, before the next tick."""
 
 LAST = MOMENTS - 1
 
@@ -81,9 +81,9 @@ def run_in(engine: Replay | CompiledReplay, world: LandingWorld) -> Run:
 
 
 def every_landing(task: Task, script: Script, most: int, rng: random.Random) -> Iterator[list[Landing]]:
-    """How the effects of a script may land: first all that becomes false before all that becomes true, the other
-    way round, and then up to ``most`` of the ways there are, each step going through its own: all of them, if
-    none has more. What the action does not set itself shows when it is over."""
+    """How the effects of a script may land: first all that becomes false before all that becomes true, the
+    other way round, and then up to ``most`` of the ways there are, each step going through its own: all of
+    them, if none has more. What the action does not set itself shows when it is over."""
     steps = list(_changes(task, script))
     yield [{v: 0 if new == 0 else LAST for v, (new, own) in step.items()} | _others(step) for step in steps]
     yield [{v: LAST if new == 0 else 0 for v, (new, own) in step.items()} | _others(step) for step in steps]
@@ -98,7 +98,7 @@ def _ways(step: Mapping[int, tuple[int, bool]], most: int, rng: random.Random) -
         moments: Iterator[tuple[int, ...]] = itertools.product(range(MOMENTS), repeat=len(own))
     else:
         moments = (tuple(rng.randrange(MOMENTS) for _ in own) for _ in range(most))
-    found = [dict(zip(own, each, strict=True)) | _others(step) for each in moments]
+    found: list[Landing] = [dict(zip(own, each, strict=True)) | _others(step) for each in moments]
     rng.shuffle(found)
     return found
 
