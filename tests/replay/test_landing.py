@@ -82,7 +82,7 @@ def test_compiled_trees_do_so_in_both_profiles(problem: Problem, kind: type[Comp
     require_library()
     tree = seen_tree(problem)
     if any(tree.task.action_by_name[node.action].timeout is not None for node in actions_of(tree.root)):
-        pytest.skip("a Timeout of BehaviorTree.CPP may assert when its tree is destroyed before it has passed")
+        pytest.skip("a Timeout of BehaviorTree.CPP may assert when a tree is destroyed before it passes")
     with kind(tree) as replay:
         check(tree, replay)
 
