@@ -9,7 +9,7 @@ from typing import TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
 from bbtc.backends.btcpp import cppcode
-from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, Profile
+from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, WHILE, Profile
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
 from bbtc.backends.exporter import Figures, Option, OptionValue
@@ -148,6 +148,8 @@ def _our_nodes(model: Element) -> None:
     ).text = (
         "What the condition returned before the running action began, if that sets it; or what it returns."
     )
+    goes_on = SubElement(model, "Decorator", ID=WHILE)
+    SubElement(goes_on, "description").text = "In a Latch, before its action: it goes on while this is so."
     committed = SubElement(model, "Decorator", ID=COMMITTED)
     SubElement(committed, "description").text = (
         "The root: knows which action runs, is RUNNING where the tick passes that by, and fails where the "

@@ -51,7 +51,7 @@ from bbtc.backends.btcpp.reader.patterns import (
 )
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.reader.xmltext import XmlElement, parse_xml
-from bbtc.backends.interface import guard_of
+from bbtc.backends.interface import during_of, guard_of
 from bbtc.backends.shape import words_of, written
 from bbtc.diagnostics import BbtcError, Diagnostic, Report, Unreadable
 from bbtc.ground.condition import TRUE, And, Condition, Or
@@ -529,6 +529,7 @@ class _Reader:
         check_limit(self._document, leaf, found, self._task.action_by_name[name])
         self._check_entries(element, parts, name, inside)
         guarded = yield self._guarded(parts, name, inside)
+        yield self._goes_on(element, parts, name, inside)
         held = [fact for note in parts.notes for fact in self._conditions.note(note, inside)]
         held += self._holds.listed(element, parts.sets, inside.ports)
         self._holds.action(element, frozenset(held), parts.waits)
@@ -577,6 +578,20 @@ class _Reader:
                 message = f"another action of this BehaviorTree keeps its state in '{parts.entry}', too"
                 hint = "put each into a BehaviorTree of its own, and call it by a SubTree"
                 raise unreadable(self._document, element, "BBT0616", message, hint=hint)
+
+    def _goes_on(self, element: XmlElement, parts: ActionParts, name: str, scope: Scope) -> Deep[None]:
+        """The action goes on while its condition says so, and no other."""
+        during = during_of(self._task, ActionNode("", name))
+        if during is None and parts.during is None:
+            return
+        if parts.during is not None:
+            live = set(self._holds.live)
+            read: Condition = yield self._conditions.read(parts.during, scope)
+            self._holds.live = live  # it is read as it is, in any case
+            if during is not None and written(self._task, read) == written(self._task, during):
+                return
+        message = f"'{clip(name)}' must go on while its condition in the task is true, and else be halted"
+        raise unreadable(self._document, parts.during or element, "BBT0616", message)
 
     def _guarded(self, parts: ActionParts, name: str, scope: Scope) -> Deep[bool]:
         """Whether the precondition is read before the action starts; nothing else may be."""
