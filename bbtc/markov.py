@@ -51,7 +51,7 @@ def independent(parts: Iterable[Mapping[_N, Fraction]]) -> Iterator[tuple[tuple[
         yield tuple(outcome for outcome, _ in drawn), prod((p for _, p in drawn), start=_ONE)
 
 
-def weighted(pairs: Iterable[tuple[Fraction, Fraction]], more: Fraction = _ZERO) -> Fraction:
+def weighted(pairs: Iterable[tuple[Fraction | int, Fraction]], more: Fraction | int = _ZERO) -> Fraction:
     """The sum of the products of pairs, and what is ``more``: what ``+`` and ``*`` give, but reduced at the
     end, and not at each step."""
     numerator, denominator = more.as_integer_ratio()
@@ -245,6 +245,6 @@ def _eliminate(
             buckets.setdefault(place[state], {})[state] = None
     for state in reversed(order):
         own = equations[state]
-        known = ((Fraction(factor), values[other]) for other, factor in own.factors.items())
-        values[state] = weighted(known, Fraction(own.constant)) / own.scale
+        known = ((factor, values[other]) for other, factor in own.factors.items())
+        values[state] = weighted(known, own.constant) / own.scale
     return True
