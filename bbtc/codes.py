@@ -145,6 +145,7 @@ _CODES = (
     Code("BBT0430", "too much for the text of a partially observable process"),
     Code("BBT0431", "true world that cannot be", _WARNING),
     Code("BBT0432", "reading that tells nothing, or the contrary"),
+    Code("BBT0433", "file that does not hold what an action may set", _WARNING),
     Code("BBT0437", "range of a number"),
     Code("BBT0438", "number without a bound"),
     Code("BBT0439", "number outside its range at the start"),
@@ -158,6 +159,7 @@ _CODES = (
     Code("BBT0447", "deadline that no run can meet"),
     Code("BBT0448", "body that tries again for ever"),
     Code("BBT0449", "durative action that takes concurrency"),
+    Code("BBT0450", "time limit on a part of a body"),
     Code("BBT0451", "events that contradict each other"),
     Code("BBT0452", "event that cannot be grounded yet"),
     # 05xx: planning

@@ -214,6 +214,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
         None if node.observe is None else node.observe.span,
         node.repeats,
         told,
+        node.uninterruptible,
         during,
         me.NOTHING if node.on_abort is None else formulas.effect(names, node.on_abort, scope),
         span=node.span,

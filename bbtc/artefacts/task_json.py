@@ -145,6 +145,8 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
     }
     if action.changes:
         value["changes"] = [_change_to_json(change, task) for change in action.changes]
+    if action.uninterruptible:
+        value["uninterruptible"] = True
     if action.duration is not None:
         value["duration"] = duration_to_json(action.duration)
     if action.timeout is not None:
@@ -426,7 +428,17 @@ class _Reader(HiddenReader):
     def action(self, at: At) -> GroundAction:
         members = at.members(
             ["name", "schema", "args", "cost", "precondition"],
-            ["outcomes", "factors", "oneof", "changes", "while", "on_abort", "duration", "timeout"],
+            [
+                "outcomes",
+                "factors",
+                "oneof",
+                "changes",
+                "uninterruptible",
+                "while",
+                "on_abort",
+                "duration",
+                "timeout",
+            ],
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -441,6 +453,7 @@ class _Reader(HiddenReader):
             factors,
             members["cost"].given(),
             tuple(self.change(each) for each in optional(members, "changes")),
+            uninterruptible="uninterruptible" in members and members["uninterruptible"].flag(),
             during=self.condition(members["while"]) if "while" in members else None,
             on_abort=self._abort(members["on_abort"]) if "on_abort" in members else (),
             duration=duration_from_json(members["duration"]) if "duration" in members else None,

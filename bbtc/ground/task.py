@@ -211,6 +211,8 @@ class GroundAction:
     factors: tuple[Factor, ...]
     cost: Fraction = Fraction(1)
     changes: tuple[Change, ...] = ()
+    uninterruptible: bool = False
+    """While it runs on a robot, nothing preempts it; figures do not ask."""
     span: Span | None = field(default=None, compare=False, repr=False)
     during: Condition | None = None
     on_abort: tuple[Factor, ...] = ()
@@ -524,6 +526,16 @@ def apparent_factors(task: Task, doing: GroundAction | GroundEvent | GroundTempl
         Factor(tuple(Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth))
         for change in doing.changes
         for knowledge in task.components[change.component].known
+    )
+
+
+def may_set(task: Task, action: GroundAction) -> frozenset[int]:
+    """Every variable that an action may set while it runs, or make known: what it does to facts by itself
+    never preempts it (docs/multi-tick-actions.md)."""
+    return frozenset(
+        variable
+        for effect in effects_of((*apparent_factors(task, action), *action.on_abort))
+        for variable, _ in effect.sets
     )
 
 

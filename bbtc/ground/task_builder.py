@@ -192,6 +192,7 @@ class TaskBuilder:
                 [factors or _NO_FACTORS for factors, _ in done],
                 map(itemgetter(1), done) if counts_cost else repeat(unit),
                 repeat(()),
+                repeat(schema.uninterruptible),
                 repeat(schema.span),
                 *self._interruptions(schema, chunk),
             )

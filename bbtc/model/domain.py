@@ -116,6 +116,8 @@ class Schema:
     repeats: bool = False
     told: tuple[Reading, ...] = ()
     """What is told besides."""
+    uninterruptible: bool = False
+    """While it runs, nothing preempts it."""
     during: Formula | None = None
     """While this is true the action goes on; else it ends, with the effect ``on_abort``."""
     on_abort: Effect = NOTHING

@@ -4,6 +4,7 @@ runtime=imported``, they import it from here. It needs py_trees (2.2 or later) a
 from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
+from bbtc.runtime.limits import Within, within
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
 from bbtc.runtime.moving import MovingWorld, Rounds, Test
 from bbtc.runtime.nodes import (
@@ -16,6 +17,7 @@ from bbtc.runtime.nodes import (
     StopWhenBlocked,
     Try,
     UntilSuccess,
+    View,
     WithBeliefs,
     WithSetup,
     all_of,
@@ -28,6 +30,7 @@ from bbtc.runtime.nodes import (
     sequence,
     skipper,
     until_success,
+    view,
 )
 from bbtc.runtime.numbers import (
     MovingNumberWorld,
@@ -68,10 +71,12 @@ __all__ = [
     "Try",
     "UntilSuccess",
     "Values",
+    "View",
     "Walk",
     "When",
     "WithBeliefs",
     "WithSetup",
+    "Within",
     "World",
     "all_of",
     "any_of",
@@ -88,5 +93,7 @@ __all__ = [
     "simulate",
     "skipper",
     "until_success",
+    "view",
     "watched",
+    "within",
 ]

@@ -114,7 +114,8 @@ class Functions:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """``(:action name :parameters … :precondition … :observe … :repeats :effect … :while … :on-abort …)``."""
+    """``(:action name :parameters … :precondition … :observe … :repeats :uninterruptible :effect …
+    :while … :on-abort …)``."""
 
     name: Name
     parameters: TypedList
@@ -123,9 +124,9 @@ class Action:
     effect: Effect | None
     span: Span = span_field()
     repeats: bool = False
+    uninterruptible: bool = False
     during: Formula | None = None
     on_abort: Effect | None = None
-
     timing: Timing | None = None
 
 

@@ -38,6 +38,7 @@ from bbtc.syntax.fields import (
     Sensed,
     Timeout,
     TimeoutProbability,
+    Uninterruptible,
     observed,
 )
 from bbtc.syntax.leaves import Misuse
@@ -209,6 +210,7 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            fields.get(Uninterruptible) is True,
             fields.get(During),
             fields.get(OnAbort),
             _timing(fields, head.to(close)),
@@ -286,6 +288,9 @@ class Builder(Expressions):
 
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
+
+    def uninterruptible(self, keyword: Token) -> Uninterruptible:
+        return Uninterruptible(keyword, True)
 
     def durative_action(
         self, head: Token, name: Token, given: list[Field[object]], close: Token
@@ -513,6 +518,11 @@ class Builder(Expressions):
 
     def body_retry(self, head: Token, number: Token, child: ast.Body, close: Token) -> ast.BodyRetry:
         return ast.BodyRetry(self.number(number), child, head.to(close))
+
+    def body_timeout(self, head: Token, _number: Token, _child: ast.Body, close: Token) -> ast.Body:
+        message = "a time limit on a part of a body is not supported"
+        hint = "give the action one: `:timeout`, which every tree keeps"
+        raise Misuse("BBT0450", message, head.to(close), hint)
 
     def body_condition(self, head: Token, formula: ast.Formula, close: Token) -> ast.BodyCondition:
         return ast.BodyCondition(formula, head.to(close))

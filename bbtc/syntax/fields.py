@@ -48,6 +48,10 @@ class Repeats(Field[bool]):
     """``:repeats``."""
 
 
+class Uninterruptible(Field[bool]):
+    """``:uninterruptible``."""
+
+
 class Duration(Field[ast.Duration]):
     """``:duration``."""
 

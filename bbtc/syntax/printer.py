@@ -540,6 +540,7 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
             tells = f":{node.observe.word}" if isinstance(node.observe, ast.SensingModel) else ":observe"
             observed = (tells, node.observe)
             repeats = (":repeats", node.repeats)
+            whole = (":uninterruptible", node.uninterruptible)
             timing = node.timing
             timed = (
                 []
@@ -556,6 +557,7 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
                 (":precondition", node.precondition),
                 observed,
                 repeats,
+                whole,
                 (":effect", node.effect),
                 *during,
                 *timed,

@@ -21,6 +21,7 @@ from bbtc.timing.figures import Times
 from bbtc.timing.figures import times as times_of
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 from bbtc.verifier.timed import time_found
+from tests.cli.program import bbtc as program
 from tests.long_form import LONG, amount
 from tests.timing.test_durations import drawn
 
@@ -383,3 +384,11 @@ def test_what_may_be_aborted_on_the_way_takes_from_none_to_all_of_its_time() -> 
     assert found is not None
     assert found.expected == (F(14), F(16))  # four pushes of 3 s, then 2 s; on average one is aborted of 2 s
     assert time_found(tree.task, tree.root, Limits(), F(5)) is None
+
+
+@pytest.mark.parametrize("stage", ["ast", "model", "ground"])
+def test_artefacts_of_domains_without_time_say_nothing_of_it(stage: str) -> None:
+    files = [f"domains/household/{name}.pddl" for name in ("domain", "look-for-soda")]
+    written = program("compile", "--emit", stage, *files).stdout
+    assert len(written) > 1000
+    assert not any(f'"{word}"' in written for word in ("timing", "duration", "timeout", "timed_out"))

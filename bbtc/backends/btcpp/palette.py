@@ -9,7 +9,7 @@ from typing import TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
 from bbtc.backends.btcpp import cppcode
-from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, Profile
+from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, Profile
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
 from bbtc.backends.exporter import Figures, Option, OptionValue
@@ -128,9 +128,24 @@ def _our_nodes(model: Element) -> None:
     keep.text = "whether the action runs once and its status is kept"
     flag = SubElement(latch, "input_port", name="flag", type="std::string", default="acting")
     flag.text = "entry of the root blackboard that is set to true while the action runs"
+    entry = SubElement(latch, "input_port", name="entry", type="std::string", default="")
+    entry.text = "entry of the blackboard that its status is kept in"
+    sets = SubElement(latch, "input_port", name="sets", type="std::string", default="")
+    sets.text = "the facts that are held while the action runs"
     SubElement(latch, "description").text = (
         "Runs the action that is its last child, once the children before it have succeeded; its "
         "status counts from the next tick on."
+    )
+    held = SubElement(model, "Decorator", ID=HELD)
+    SubElement(
+        held, "description"
+    ).text = (
+        "What the condition returned before the running action began, if that sets it; or what it returns."
+    )
+    committed = SubElement(model, "Decorator", ID=COMMITTED)
+    SubElement(committed, "description").text = (
+        "The root: knows which action runs, is RUNNING where the tick passes that by, and fails where the "
+        "tree is RUNNING but no action is."
     )
 
 

@@ -235,7 +235,7 @@ def run_planner(
             hint="another strategy may reach it",
         )
     most = options.max_actions
-    ends = _dead_ends(plan, limits)
+    ends = _dead_ends(plan, limits) if within is None else ()
     made = simplified_line(told[-1], plan.tree) if told and not quiet else []
     lines = [
         *made,

@@ -15,8 +15,9 @@ from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
 from bbtc.backends.interface import BOUNDS, action_symbol, parameters_of, variable_symbol
 from bbtc.backends.names import Kind, Symbol, camel, port_values, possible_identifiers
 from bbtc.diagnostics import Unreadable
-from bbtc.ground.condition import Condition, within
+from bbtc.ground.condition import Condition, Is, within
 from bbtc.ground.task import Task, ground_name
+from bbtc.kleene import Truth
 
 _WHOLE = re.compile(r"[+-]?[0-9]{1,12}", re.ASCII)
 
@@ -95,6 +96,12 @@ class Leaves:
             message = f"the port '{port}' holds a whole number, not '{clip(value)}'"
             raise unreadable(self._document, element, "BBT0604", message, attribute=port)
         return int(value)
+
+    def condition(self, element: XmlElement, ports: Mapping[str, str]) -> Condition:
+        """What the leaf of a variable or a number asks. Raises :class:`Unreadable`."""
+        if self.is_number(element):
+            return self.number(element, ports)
+        return Is(self.variable(element, ports), Truth.TRUE)
 
     def action(self, element: XmlElement, ports: Mapping[str, str]) -> str:
         """The action that an action leaf runs. Raises :class:`Unreadable`."""
