@@ -20,6 +20,7 @@ from bbtc.backends.btcpp.idioms import (
     HOLD_LABEL,
     LATCH,
     SKIPPER,
+    TIMEOUT,
     UNTIL_SUCCESS,
     WHILE,
 )
@@ -482,6 +483,7 @@ READ = frozenset(
         "Inverter",
         "ScriptCondition",
         LATCH,
+        TIMEOUT,
         WHILE,
     )
 ).union(
