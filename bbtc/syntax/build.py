@@ -29,6 +29,7 @@ from bbtc.syntax.fields import (
     Field,
     Fields,
     Implied,
+    NumberRange,
     Observe,
     OnAbort,
     OnTimeout,
@@ -38,6 +39,7 @@ from bbtc.syntax.fields import (
     Sensed,
     Timeout,
     TimeoutProbability,
+    Types,
     Uninterruptible,
     observed,
 )
@@ -64,20 +66,6 @@ _DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[
 
 
 _HOW_LONG = "write `(= ?duration n)`; or use an `:action`, with `:duration (uniform a b)` for one that varies"
-
-
-class Types(NamedTuple):
-    """``- type`` or ``- (either type…)`` behind names."""
-
-    names: tuple[ast.Name, ...]
-    span: Span
-
-
-class NumberRange(NamedTuple):
-    """``- (int low high)`` behind a function, with what it spans."""
-
-    range: ast.NumberRange
-    span: Span
 
 
 class DerivedHead(NamedTuple):
