@@ -70,6 +70,13 @@ def guard_of(task: Task, node: ActionNode) -> Condition | None:
     return None if guard == TRUE else guard
 
 
+def during_of(task: Task, node: ActionNode) -> Condition | None:
+    """What must stay true while the action of a node goes on, in normal form; None if nothing."""
+    during = task.action_by_name[node.action].during
+    during = None if during is None else normal(task, during)
+    return None if during == TRUE else during
+
+
 def interface_of(tree: Tree) -> Interface:
     """The interface of a tree: what its conditions, guards and actions refer to, and what its monitor asks
     for."""
@@ -81,9 +88,8 @@ def interface_of(tree: Tree) -> Interface:
             read.update(dict.fromkeys(variables(normal(task, node.condition))))
         elif isinstance(node, ActionNode):
             actions[action_symbol(task.action_by_name[node.action])] = None
-            guard = guard_of(task, node)
-            if guard is not None:
-                read.update(dict.fromkeys(variables(guard)))
+            for asked_too in (guard_of(task, node), during_of(task, node)):
+                read.update(dict.fromkeys(variables(asked_too or TRUE)))
     told = frozenset[int]() if tree.monitor is None else tree.monitor.known
     asked = [index for index in read if index not in told]
     asked += [] if tree.monitor is None else sorted(tree.monitor.seen.difference(asked))
