@@ -420,7 +420,7 @@ def explain(code: str) -> str:
 
 
 def _read(sources: Sequence[Source], limits: Limits | None) -> list[SourceFile]:
-    from bbtc.syntax.reader import read_source
+    from bbtc.files.sources import read_source
 
     most = (limits or Limits()).file_bytes
     return [s if isinstance(s, SourceFile) else read_source(os.fspath(s), most) for s in sources]

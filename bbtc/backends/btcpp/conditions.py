@@ -15,11 +15,13 @@ A literal is a leaf: SUCCESS, FAILURE, RUNNING for true, false, unknown. What is
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Literal
 from xml.etree.ElementTree import Element
 
 from typing_extensions import assert_never
 
+from bbtc.backends.btcpp.bindings.bound import NEGATION
 from bbtc.backends.btcpp.idioms import Idioms, decorated
 from bbtc.backends.btcpp.names import BtcppNames, TreeIds, is_numeric, ports_for
 from bbtc.backends.interface import variable_symbol
@@ -140,13 +142,15 @@ class ConditionWriter:
             case Is(variable, Truth.TRUE):
                 return self._leaf(variable, binding)
             case Is(variable, Truth.FALSE):
-                return decorated("Inverter", self._leaf(variable, binding))
+                leaf = self._leaf(variable, binding)
+                # One that answers the contrary is inverted already.
+                return leaf[0] if leaf.tag == NEGATION else decorated(NEGATION, leaf)
             case Is(variable, _):
                 return self._test("unknown", variable, binding)
             case Known(variable):
                 return self._test("known", variable, binding)
             case Not(part):
-                return decorated("Inverter", self._kleene(part, binding))
+                return decorated(NEGATION, self._kleene(part, binding))
             case And(parts):
                 return self._junction("sequence", parts, binding)
             case Or(parts):
@@ -175,12 +179,15 @@ class ConditionWriter:
     def _leaf(self, variable: int, binding: Mapping[str, str]) -> Element:
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
+        bound = self._names.bound.element(symbol, read.args, partial(self.value, binding=binding))
+        if bound is not None:
+            return bound
         return self._with_ports(Element(self._names.ids[symbol]), symbol, read.args, binding)
 
     def _test(self, kind: Literal["known", "unknown"], variable: int, binding: Mapping[str, str]) -> Element:
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
-        if any(is_numeric(arg) for arg in read.args):
+        if any(is_numeric(arg) for arg in read.args) or symbol in self._names.bound.leaves:
             return self._idioms.test(kind, self._leaf(variable, binding))
         if (kind, symbol) not in self._tests:
             title = f"{kind.capitalize()}{self._names.plain[symbol]}"

@@ -9,10 +9,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from xml.etree.ElementTree import Comment, Element, SubElement, tostring
 
 from typing_extensions import assert_never
 
+from bbtc.backends.btcpp.bindings.bound import BINDINGS, bindings_of
+from bbtc.backends.btcpp.bindings.entries import Bindings
 from bbtc.backends.btcpp.conditions import ConditionWriter
 from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile, forgotten, full_again
 from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
@@ -49,16 +52,17 @@ class BtcppExporter:
     options: tuple[Option, ...] = (
         NODES,
         NAMESPACE,
+        BINDINGS,
         Option("model", True, "append the TreeNodesModel, which editors such as Groot2 read"),
         Option("notes", True, "append the comment from which `bbtc import` reads the very same tree"),
     )
 
     def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
-        """The XML. Raises :class:`BbtcError` for a tree that is too deep (BBT0705) and for a namespace
-        that is none (BBT0704)."""
+        """The XML. Raises :class:`BbtcError` for a tree that is too deep (BBT0705), for a namespace
+        that is none (BBT0704), and for bindings that have faults or do not fit the tree."""
         del figures  # a file that runs has no place for them
         namespace = namespace_of(self.name, options)
-        writer = _Writer(tree, profile_of(options), namespace)
+        writer = _Writer(tree, profile_of(options), namespace, bindings_of(options))
         document = writer.document(bool(options.get("model", True)), bool(options.get("notes", True)))
         return xml_text(document)
 
@@ -98,10 +102,10 @@ class _Hoisted:
 class _Writer:
     """Writes one document: BehaviorTrees are collected while the main tree is written."""
 
-    def __init__(self, tree: Tree, profile: Profile, namespace: str) -> None:
+    def __init__(self, tree: Tree, profile: Profile, namespace: str, bindings: Bindings) -> None:
         self.tree = tree
         self.task: Task = tree.task
-        self.names = btcpp_names(tree, namespace)
+        self.names = btcpp_names(tree, namespace, bindings)
         self.profile: Profile = profile
         self.tree_ids = TreeIds(self.names, self.task.problem)
         prefix = entry_prefix(namespace)
@@ -292,10 +296,13 @@ class _Writer:
         for an attempt keeps how it ended."""
         # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
         passed = {port: arg for port, arg in self._ports(action) if not is_numeric(arg)}
-        tag = Element(self.names.ids[action_symbol(action)])
-        for port, arg in self._ports(action):
-            tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
         binding = {arg: port for port, arg in reversed(passed.items())}
+        symbol, value = action_symbol(action), partial(self.conditions.value, binding=binding)
+        tag = self.names.bound.element(symbol, action.args, value)
+        if tag is None:
+            tag = Element(self.names.ids[symbol])
+            for port, arg in self._ports(action):
+                tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
         needed = self._start_conditions(guard, binding, counters)
         title = self.names.plain[action_symbol(action)]
         often = "Again" if not node.latched else "Once" if entry is None else "OnceAnAttempt"
@@ -319,9 +326,12 @@ class _Writer:
         return self.idioms.start_conditions(read, counters)
 
     def _leaf(self, action: GroundAction, binding: Mapping[str, str]) -> Element:
-        element = Element(self.names.ids[action_symbol(action)])
-        for port, arg in self._ports(action):
-            element.set(port, self.conditions.value(arg, binding))
+        value = partial(self.conditions.value, binding=binding)
+        element = self.names.bound.element(action_symbol(action), action.args, value)
+        if element is None:
+            element = Element(self.names.ids[action_symbol(action)])
+            for port, arg in self._ports(action):
+                element.set(port, value(arg))
         return element
 
     def _ports(self, action: GroundAction) -> list[tuple[str, str]]:

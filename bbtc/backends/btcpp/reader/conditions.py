@@ -10,7 +10,7 @@ from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.reader.leaves import Leaves
 from bbtc.backends.btcpp.reader.patterns import KNOWN, REGISTER, UNKNOWN, Match, has, match, tag_of
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.backends.shape import DEEPEST_CONDITION, can_be_unknown
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Or, negation
 from bbtc.ground.task import Task

@@ -15,7 +15,7 @@ from typing import TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, UNTIL_SUCCESS
-from bbtc.backends.btcpp.reader.xmltext import XmlElement
+from bbtc.backends.btcpp.xmltext import XmlElement
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
 _COUNTER = r"@[A-Za-z_]\w*"

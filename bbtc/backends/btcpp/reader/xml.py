@@ -45,7 +45,7 @@ from bbtc.backends.btcpp.reader.patterns import (
     tag_of,
 )
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlElement, parse_xml
+from bbtc.backends.btcpp.xmltext import XmlElement, parse_xml
 from bbtc.backends.interface import guard_of
 from bbtc.backends.shape import words_of, written
 from bbtc.diagnostics import BbtcError, Diagnostic, Report, Unreadable
