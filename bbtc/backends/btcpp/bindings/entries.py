@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -121,12 +122,13 @@ class RosCall:
 @dataclass(frozen=True, slots=True)
 class RosTopic:
     """A topic of ROS 2 whose latest message answers a condition. ``nan``: a value that is no number tells
-    that it is unknown."""
+    that it is unknown. ``latched``: the last message waits for those who come later (transient local)."""
 
     topic: str
     type: tuple[str, str, str]
     where: Comparison
     nan: bool = False
+    latched: bool = False
     span: Span | None = field(default=None, compare=False)
 
 
@@ -195,4 +197,4 @@ class NodeModel:
 
 def is_number(text: str) -> bool:
     """Is it a finite number, as C++ and YAML write it?"""
-    return _NUMBER.fullmatch(text) is not None
+    return _NUMBER.fullmatch(text) is not None and math.isfinite(float(text))

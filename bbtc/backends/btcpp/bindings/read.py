@@ -206,12 +206,17 @@ class _Reader:
         )
 
     def _topic(self, at: At) -> RosTopic:
-        members = at.members(["topic", "type", "where"], ["unknown"])
+        members = at.members(["topic", "type", "where"], ["unknown", "latched"])
+        where = self._comparison(members["where"], fixed=False)
+        nan = "unknown" in members and members["unknown"].word("nan") == "nan"
+        if nan and not _numeric(where.value):
+            raise members["unknown"].fault("BBT0604", "only a number can be none: what is compared is none")
         return RosTopic(
             _match(members["topic"], _ROS_NAME, "the name of a topic"),
             self._type(members["type"], "msg"),
-            self._comparison(members["where"], fixed=False),
-            "unknown" in members and members["unknown"].word("nan") == "nan",
+            where,
+            nan,
+            members["latched"].flag() if "latched" in members else False,
             self.marked.span(at.path),
         )
 
@@ -321,8 +326,12 @@ def _written(at: At, text: str) -> Text:
 
 def _ordered(at: At, operator: str, value: Text | Argument) -> str:
     """The operator, if such values have an order."""
-    numeric = value.numeric if isinstance(value, Argument) and value.table else False
-    numeric = numeric or (isinstance(value, Text) and value.plain == "number")
-    if operator not in ("==", "!=") and not numeric:
+    if operator not in ("==", "!=") and not _numeric(value):
         raise at.fault("BBT0604", f"'{operator}' compares numbers only")
     return operator
+
+
+def _numeric(value: Text | Argument) -> bool:
+    if isinstance(value, Argument):
+        return value.table is not None and value.numeric
+    return value.plain == "number"
