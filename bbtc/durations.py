@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from decimal import ROUND_HALF_EVEN, Context, Decimal, localcontext
 from fractions import Fraction
+from functools import cache
 from typing import TypeAlias
 
 from typing_extensions import assert_never
@@ -68,6 +70,17 @@ class LogNormal:
 
 
 Duration: TypeAlias = Fixed | Uniform | Triangular | Empirical | LogNormal
+
+
+@dataclass(frozen=True, slots=True)
+class UpTo:
+    """Some time up to a duration, nobody knows which: what ends an action early does not tell when."""
+
+    most: Duration
+
+
+Taken: TypeAlias = Duration | UpTo
+"""What something takes: a duration, or a part of one."""
 
 INSTANT = Fixed(_ZERO)
 """What takes no time."""
@@ -148,17 +161,17 @@ def plain(duration: Duration) -> Duration:
 # --- probabilities -------------------------------------------------------------------------------
 
 
-def below(duration: Duration, seconds: Fraction) -> Bounds:
+def below(duration: Taken, seconds: Fraction) -> Bounds:
     """The probability that it takes less than so many seconds."""
     return _distribution(duration, seconds, strictly=True)
 
 
-def within(duration: Duration, seconds: Fraction) -> Bounds:
+def within(duration: Taken, seconds: Fraction) -> Bounds:
     """The probability that it takes at most so many seconds."""
     return _distribution(duration, seconds, strictly=False)
 
 
-def _distribution(duration: Duration, at: Fraction, *, strictly: bool) -> Bounds:
+def _distribution(duration: Taken, at: Fraction, *, strictly: bool) -> Bounds:
     match duration:
         case Fixed(seconds):
             return _exactly(_ONE if seconds < at or (seconds == at and not strictly) else _ZERO)
@@ -180,6 +193,9 @@ def _distribution(duration: Duration, at: Fraction, *, strictly: bool) -> Bounds
             if at <= 0:
                 return _exactly(_ZERO)
             return _outward(_normal(math.log(at / median) / float(sigma)))
+        case UpTo(most):
+            surely = at > 0 or (at == 0 and not strictly)
+            return _distribution(most, at, strictly=strictly)[0], _ONE if surely else _ZERO
         case _:
             assert_never(duration)
 
@@ -198,7 +214,7 @@ def _outward(value: float) -> Bounds:
     return max(_ZERO, near - MARGIN), min(_ONE, near + MARGIN)
 
 
-def longest(duration: Duration) -> Fraction | None:
+def longest(duration: Taken) -> Fraction | None:
     """The longest that it may take; None where it may take any time."""
     match duration:
         case Fixed(seconds):
@@ -209,11 +225,13 @@ def longest(duration: Duration) -> Fraction | None:
             return points[-1][0]
         case LogNormal():
             return None
+        case UpTo(most):
+            return longest(most)
         case _:
             assert_never(duration)
 
 
-def shortest(duration: Duration) -> Fraction:
+def shortest(duration: Taken) -> Fraction:
     """What it takes at least (or comes as close to as one likes)."""
     match duration:
         case Fixed(seconds):
@@ -222,7 +240,7 @@ def shortest(duration: Duration) -> Fraction:
             return low
         case Empirical(points):
             return points[0][0]
-        case LogNormal():
+        case LogNormal() | UpTo():
             return _ZERO
         case _:
             assert_never(duration)
@@ -231,7 +249,7 @@ def shortest(duration: Duration) -> Fraction:
 # --- means ---------------------------------------------------------------------------------------
 
 
-def mean(duration: Duration) -> Bounds:
+def mean(duration: Taken) -> Bounds:
     """The expected number of seconds."""
     match duration:
         case Fixed(seconds):
@@ -245,11 +263,13 @@ def mean(duration: Duration) -> Bounds:
         case LogNormal(median, sigma):
             near = median * Fraction(math.exp(float(sigma) ** 2 / 2))
             return near * (1 - MARGIN), near * (1 + MARGIN)
+        case UpTo(most):
+            return _ZERO, mean(most)[1]
         case _:
             assert_never(duration)
 
 
-def partial_mean(duration: Duration, most: Fraction) -> Bounds:
+def partial_mean(duration: Taken, most: Fraction) -> Bounds:
     """The expected number of seconds where it takes at most so many, counting 0 where it takes more."""
     match duration:
         case Fixed(seconds):
@@ -270,6 +290,8 @@ def partial_mean(duration: Duration, most: Fraction) -> Bounds:
             least, greatest = _outward(_normal(math.log(most / median) / spread - spread))
             short, long = mean(duration)
             return short * least, long * greatest
+        case UpTo(until):
+            return _ZERO, mean(until)[1]
         case _:
             assert_never(duration)
 
@@ -300,12 +322,78 @@ def exceeding(duration: Duration, seconds: Fraction) -> Fraction:
     return Fraction(-((least - 1) * grid // 1), grid)
 
 
+# --- what happens meanwhile ----------------------------------------------------------------------
+
+GRID = 10**12
+"""Probabilities of what happens while an action goes on are multiples of one in so many."""
+
+
+@cache
+def meanwhile(chance: Fraction, duration: Duration, at_most: Fraction | None = None) -> Fraction:
+    """The probability that what happens with a ``chance`` each second happens at least once in the duration,
+    or by ``at_most``: 1 - E (1 - chance)^T, as the nearest multiple of 1/:data:`GRID`. Not known of lognormal
+    durations, for which it raises ``ValueError``."""
+    if chance == 0:
+        return _ZERO
+    if chance == 1:  # at once, unless it takes no time at all
+        return 1 - within(duration, _ZERO)[0]
+    with localcontext(Context(prec=100)):
+        base = Decimal(chance.denominator - chance.numerator) / Decimal(chance.denominator)
+        left = _expected_power(base, plain(duration), at_most)
+        nearest = (1 - left) * GRID
+        return Fraction(int(nearest.to_integral_value(ROUND_HALF_EVEN)), GRID)
+
+
+def _expected_power(base: Decimal, duration: Duration, at_most: Fraction | None) -> Decimal:
+    """E base^T, by the closed integrals of base^t (c + d t)."""
+
+    def number(value: Fraction) -> Decimal:
+        return Decimal(value.numerator) / Decimal(value.denominator)
+
+    def power(seconds: Fraction) -> Decimal:
+        return (number(seconds) * base.ln()).exp()
+
+    def integral(start: Fraction, end: Fraction, constant: Fraction, slope: Fraction) -> Decimal:
+        end = end if at_most is None else min(end, max(start, at_most))
+        rate = -base.ln()
+
+        def antiderivative(at: Fraction) -> Decimal:
+            return -power(at) * (number(constant + slope * at) / rate + number(slope) / rate**2)
+
+        return antiderivative(end) - antiderivative(start) if end > start else Decimal(0)
+
+    cut = Decimal(0)
+    if at_most is not None:
+        cut = power(at_most) * number(1 - within(duration, at_most)[0])
+    match duration:
+        case Fixed(seconds):
+            return power(seconds if at_most is None else min(seconds, at_most))
+        case Empirical(points):
+            ends = ((s if at_most is None else min(s, at_most), weight) for s, weight in points)
+            return sum((number(weight) * power(seconds) for seconds, weight in ends), Decimal(0))
+        case Uniform(low, high):
+            return cut + integral(low, high, 1 / (high - low), _ZERO)
+        case Triangular(low, mode, high):
+            total = cut
+            if mode > low:
+                rise = 2 / ((high - low) * (mode - low))
+                total += integral(low, mode, -rise * low, rise)
+            if high > mode:
+                fall = 2 / ((high - low) * (high - mode))
+                total += integral(mode, high, fall * high, -fall)
+            return total
+        case LogNormal():
+            raise ValueError("not known of a lognormal duration")
+        case _:
+            assert_never(duration)
+
+
 # --- in steps ------------------------------------------------------------------------------------
 
 
-def lattice(duration: Duration) -> tuple[Fraction, ...] | None:
+def lattice(duration: Taken) -> tuple[Fraction, ...] | None:
     """All values that it can have; None where it can have any of a range."""
-    match plain(duration):
+    match duration if isinstance(duration, UpTo) else plain(duration):
         case Fixed(seconds):
             return (seconds,)
         case Empirical(points):
@@ -315,7 +403,7 @@ def lattice(duration: Duration) -> tuple[Fraction, ...] | None:
 
 
 def in_steps(
-    duration: Duration, step: Fraction, most: int, *, late: bool, at_most: Fraction | None = None
+    duration: Taken, step: Fraction, most: int, *, late: bool, at_most: Fraction | None = None
 ) -> list[Fraction]:
     """How probably it takes 0, 1, 2, … steps, up to ``most``, rounded up if ``late`` and down otherwise: what
     it takes is never less, or never more, than the truth. What is missing to 1 takes longer than ``most``.

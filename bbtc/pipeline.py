@@ -201,9 +201,12 @@ def _hidden(model: Model, report: Report, limits: Limits) -> Iterator[str]:
     find out in a check."""
     from bbtc.ground.hidden.summary import hidden_summary
     from bbtc.ground.instantiate import ground
+    from bbtc.ground.numbers.digits import number_faults
     from bbtc.ground.refused import refused
     from bbtc.model.hidden import has_hidden_state
 
+    for diagnostic in number_faults(model):
+        report.add(diagnostic)
     not_yet = list(refused(model))
     for diagnostic in not_yet:
         report.add(replace(diagnostic, severity=Severity.NOTE))

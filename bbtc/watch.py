@@ -57,17 +57,26 @@ class Watch:
         limits = self.limits
         if limits is None or time.monotonic() < self._again:
             return
-        if limits.met and not importing(frame):
+        if limits.met and not undivided(frame):
             self._again = time.monotonic() + max(_LEAST_OVERTIME, _OVERTIME * (limits.seconds or 0.0))
             limits = replace(limits, watcher=None)
             limits.check_time(self._doing)
             limits.check_memory(self._doing)  # which may have been looked at a moment ago
 
 
-def importing(frame: FrameType | None) -> bool:
-    """Is a module being imported? One that is left half imported may never be imported again."""
+_WHOLE = {("subprocess", "__init__"), ("shutil", "rmtree")}
+"""Modules and functions of Python's that start a process, and remove a folder."""
+
+
+def undivided(frame: FrameType | None) -> bool:
+    """Is something being done that must not be left half done? A module that is left half imported may never
+    be imported again, a process that is left half started is ended by nobody, and who is interrupted while
+    closing files may close them twice."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
+        code = frame.f_code
+        if code.co_filename.startswith("<frozen importlib"):
+            return True
+        if (frame.f_globals.get("__name__"), code.co_name) in _WHOLE:
             return True
         frame = frame.f_back
     return False

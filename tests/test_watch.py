@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -99,6 +100,34 @@ def test_other_threads_are_not_watched() -> None:
     thread.start()
     thread.join()
     assert not found
+
+
+class _Met(os.PathLike[str]):
+    """A path that a signal comes in the middle of asking for, when a limit is met."""
+
+    def __init__(self, path: str) -> None:
+        self.path, self.asked = path, 0
+
+    def __fspath__(self) -> str:
+        self.asked += 1
+        with watching(Limits(seconds=0.0)) as (watch, _):
+            watch.look(signal.SIGALRM, sys._getframe())
+        return self.path
+
+
+def test_a_process_is_started_and_a_folder_removed_whole(tmp_path: Path) -> None:
+    """Else nobody would end the process, and a file might be closed twice."""
+    with pytest.raises(LimitReached):
+        os.fspath(_Met("true"))
+    program = _Met(sys.executable)
+    with subprocess.Popen([program, "-c", "pass"]) as process:
+        assert process.wait() == 0
+    (tmp_path / "full" / "empty").mkdir(parents=True)
+    folder = _Met(str(tmp_path / "full"))
+    shutil.rmtree(folder)
+    assert program.asked
+    assert folder.asked
+    assert not (tmp_path / "full").exists()
 
 
 def test_a_module_is_imported_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from math import inf
 
 from typing_extensions import assert_never
 
@@ -21,7 +22,9 @@ from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.amount import Amount, FunctionValue
 from bbtc.model.hidden import has_hidden_state
+from bbtc.model.intervals import Interval, interval, never
 from bbtc.model.types import Parameter
 from bbtc.source import Span
 from bbtc.syntax.words import TEST_WORDS
@@ -90,7 +93,7 @@ def _unread(known: Known) -> Iterator[tuple[md.Predicate, bool]]:
     written = {leaf.predicate for schema in model.schemas.values() for leaf in me.settings(schema.effects)}
     written |= {rule.predicate for rule in model.rules}
     for name, predicate in model.predicates.items():
-        if name not in read and name not in model.symbols:
+        if name not in read and name not in model.symbols and not md.is_number(name):
             yield predicate, name in written
 
 
@@ -303,7 +306,7 @@ def _contradictions_in(
         case me.Choice(branches):
             for branch in branches:
                 yield from _contradictions_in(branch.effect, dict(above))
-        case me.Add():
+        case me.Add() | me.Change():
             return
         case _:
             assert_never(effect)
@@ -348,6 +351,31 @@ def _irrelevant_actions(known: Known) -> Iterator[Diagnostic]:
                 schema.span,
                 "no condition on the way to the goal reads what it changes",
             )
+
+
+def _impossible_comparisons(known: Known) -> Iterator[Diagnostic]:
+    """Comparisons that no values within the ranges make true. Of numbers without a declared range nothing is
+    known here, and functions that never change have the values of `:init`."""
+    model = known.model
+    changed = {change.function for each in model.schemas.values() for change in me.changes(each.effects)}
+
+    def of(amount: Amount) -> Interval:
+        return interval(amount, value)
+
+    def value(read: FunctionValue) -> Interval:
+        range_ = model.functions[read.function].range
+        if range_ is not None:
+            return Fraction(range_.low), Fraction(range_.high)
+        given = [number for (name, _), number in model.init.numbers.items() if name == read.function]
+        if read.function in changed or not given:
+            return -inf, inf
+        return min(given), max(given)
+
+    for condition in known.conditions:
+        for compare in mf.comparisons(condition):
+            if never(compare, of):
+                message = "this can never hold: no values within the ranges compare so"
+                yield Diagnostic("BBT0442", message, compare.span)
 
 
 # --- probabilities, parameters, templates ----------------------------------------------------
@@ -447,6 +475,7 @@ CHECKS = (
     Check("BBT0301", _unused_predicates),
     Check("BBT0301", _unread_predicates, needs_problem=True),
     Check("BBT0302", _unreachable_actions, needs_problem=True),
+    Check("BBT0442", _impossible_comparisons, needs_problem=True),
     Check("BBT0303", _contradictions),
     Check("BBT0304", _lost_knowledge),
     Check("BBT0304", _hopeless_conditions, needs_problem=True),

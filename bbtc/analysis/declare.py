@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 from dataclasses import replace
+from fractions import Fraction
 from typing import TypeVar
 
 from bbtc.analysis.names import Declared, Names, Signature
 from bbtc.diagnostics import Related, Report
-from bbtc.model.domain import Function, Predicate
+from bbtc.model.domain import Function, NumberRange, Predicate
 from bbtc.model.types import OBJECT, Object, Type, TypeHierarchy
 from bbtc.source import Span
 from bbtc.syntax import ast
@@ -232,11 +233,46 @@ def _functions(names: Names, domain: ast.Definition) -> None:
                     node.span,
                     "functions have numbers as values; use a predicate for objects",
                 )
-            function = Function(node.name.key, names.parameters(node.parameters), node.name.span)
+            function = Function(
+                node.name.key,
+                names.parameters(node.parameters),
+                node.name.span,
+                None if node.range is None else _range(names, node.name, node.range),
+            )
             before = names.functions.setdefault(node.name.key, function)
             if before is not function:
                 same = [p.types for p in before.parameters] == [p.types for p in function.parameters]
                 twice(names.report, "function", node.name, before, harmless=same)
+
+
+MOST_VALUES = 2**31
+"""So many values a number may have, and so large may they be."""
+
+
+def _range(names: Names, name: ast.Name, node: ast.NumberRange) -> NumberRange | None:
+    """A declared range; None after an error."""
+    for bound in (node.low, node.high):
+        if bound.value.denominator != 1:
+            message = f"the range of `{name.text}` goes from one whole number to another, not to {bound.text}"
+            names.report.error("BBT0437", message, bound.span)
+            return None
+        if abs(bound.value) > MOST_VALUES:
+            message = f"the bound {bound.text} of `{name.text}` is too large"
+            names.report.error("BBT0437", message, bound.span, "numbers stay within 2^31")
+            return None
+    low, high = int(node.low.value), int(node.high.value)
+    if low > high:
+        message = f"the range of `{name.text}` is empty: {low} is above {high}"
+        names.report.error("BBT0437", message, node.span, f"write `(int {high} {low})`")
+        return None
+    policy = None if node.policy is None else node.policy.key
+    if policy not in (None, ":block", ":saturate"):
+        assert node.policy is not None
+        message = f"`{node.policy.text}` does not say what happens at the bounds of `{name.text}`"
+        hint = "`:saturate`, the default, stays at the bound; with `:block` the action does not start"
+        names.report.error("BBT0437", message, node.policy.span, hint)
+        return None
+    return NumberRange(low, high, policy == ":block", span=node.span)
 
 
 def _fluents(names: Names, problem: ast.Definition | None) -> None:
@@ -257,7 +293,39 @@ def _fluents(names: Names, problem: ast.Definition | None) -> None:
             elif metric.direction == "maximize" and key not in costs:
                 counted = (counted - rewards) | {key}
                 rewards.add(key)
+        elif metric.direction == "minimize" and (terms := weighted(metric.expression, rewards)) is not None:
+            if "total-time" not in names.functions:
+                names.per_action = terms.pop("total-time", Fraction(0))
+            costs |= terms.keys()
+            counted = (counted - costs) | {key for key, weight in terms.items() if weight}
+            names.weights = terms
     names.costs, names.rewards, names.counted = frozenset(costs), frozenset(rewards), frozenset(counted)
+
+
+def weighted(
+    expression: ast.NumericExpression, others: Container[str] = frozenset()
+) -> dict[str, Fraction] | None:
+    """A sum of fluents without arguments, none of them among ``others``, each with its weight, which is not
+    below 0; None for what is no such sum."""
+    found: dict[str, Fraction] = {}
+    match expression:
+        case ast.FluentRef(name, ()) if name.key not in others and name.key not in GOAL_FLUENTS:
+            return {name.key: Fraction(1)}
+        case ast.Arithmetic("+", operands):
+            for operand in operands:
+                terms = weighted(operand, others)
+                if terms is None:
+                    return None
+                for key, weight in terms.items():
+                    found[key] = found.get(key, Fraction(0)) + weight
+            return found
+        case ast.Arithmetic("*", (ast.Number() as number, other) | (other, ast.Number() as number)):
+            terms = weighted(other, others)
+            if terms is None or number.value < 0:
+                return None
+            return {key: number.value * weight for key, weight in terms.items()}
+        case _:
+            return None
 
 
 def _actions(names: Names, nodes: list[ast.Action]) -> None:

@@ -9,6 +9,7 @@ from bbtc.analysis.declare import sections
 from bbtc.analysis.names import Names
 from bbtc.markov import reachable
 from bbtc.model import domain as md
+from bbtc.model import effect as me
 from bbtc.model import formula as mf
 from bbtc.syntax import ast
 
@@ -23,14 +24,29 @@ def events(names: Names, domain: ast.Definition) -> Iterator[md.Schema]:
         signature = names.events[name]
         scope = {parameter.name: parameter for parameter in signature.parameters}
         _check_order(names, node, before, told)
+        effect, per = formulas.effect(names, node.effect, scope), _per(names, node)
+        if per == "second":
+            _check_single(names, node, effect)
         yield md.Schema(
             name,
             signature.parameters,
             mf.ALWAYS if node.precondition is None else formulas.formula(names, node.precondition, scope),
-            formulas.effect(names, node.effect, scope),
-            exogenous=md.Exogenous(_per(names, node), tuple(before[name])),
+            effect,
+            exogenous=md.Exogenous(per, tuple(before[name])),
             span=node.span,
         )
+
+
+def _check_single(names: Names, node: ast.Exogenous, effect: me.Effect) -> None:
+    """Report a draw by time of more than one thing: which of them comes first would be another draw."""
+    for choice in (part for part in me.walk(effect) if isinstance(part, me.Choice)):
+        happens = [branch.effect for branch in choice.branches if branch.effect != me.NOTHING]
+        nested = any(isinstance(part, me.Choice) for each in happens for part in me.walk(each))
+        if len(happens) > 1 or choice.oneof or nested:
+            message = f"event `{node.name.text}` draws one of several effects each second"
+            hint = "write `(probabilistic p e)`, with one effect, and an event for each of the others"
+            names.report.error("BBT0231", message, choice.span or node.effect.span, hint)
+            return
 
 
 def _before(names: Names, node: ast.Exogenous) -> dict[str, None]:

@@ -84,7 +84,7 @@ class Reached:
             case mf.Test(kind, atom):
                 unknown = (kind == "unknown") is not negative
                 return not unknown or (atom.predicate, Truth.UNKNOWN) in self.values
-            case mf.Equal():
+            case mf.Equal() | mf.Compare():
                 return True
             case mf.Not(part):
                 return self.possible(part, not negative)
@@ -127,6 +127,9 @@ class Known:
 def reached(model: md.Model) -> Reached:
     """Predicate-level reachability from the initial state of a model with a problem."""
     result = Reached()
+    for name in model.predicates:
+        if md.is_number(name):  # what numbers can be is not traced
+            result.values.update({(name, value): None for value in (Truth.TRUE, Truth.FALSE)})
     given: dict[str, set[Truth]] = {}
     for fact in model.init.facts:
         given.setdefault(fact.predicate, set()).add(fact.value)
@@ -215,7 +218,7 @@ def _apply(effect: me.Effect, result: Reached) -> None:
     match effect:
         case me.Set(predicate, _, value):
             result.values[predicate, value] = None
-        case me.Add():
+        case me.Add() | me.Change():
             return
         case me.Together(parts):
             for part in parts:
@@ -241,7 +244,14 @@ def relevant(model: md.Model) -> set[str]:
     def leads(node: tuple[bool, str]) -> Iterator[tuple[bool, str]]:
         is_action, name = node
         if is_action:
-            return read(schema_conditions(model.schemas[name]) if name in model.schemas else ())
+            if name not in model.schemas:
+                return iter(())
+            kept = (
+                (False, md.number_predicate(change.function))
+                for change in me.changes(model.schemas[name].effects)
+                if (range_ := model.functions[change.function].range) is not None and range_.blocks
+            )
+            return chain(read(schema_conditions(model.schemas[name])), kept)
         asked = model.thresholds.get(name)
         return chain(
             read(rule.condition for rule in rules.get(name, ())),

@@ -16,6 +16,7 @@ from bbtc.kleene import Truth
 from bbtc.model import domain as md
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.amount import functions
 from bbtc.model.types import Parameter
 from bbtc.rounding import decimal, too_long
 from bbtc.source import Span
@@ -23,12 +24,23 @@ from bbtc.syntax import ast
 from bbtc.syntax.words import TEST_WORDS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 HALF = Fraction(1, 2)
 ROUNDING = Fraction(1, 10**9)
 """Probabilities whose sum differs from 1 by at most this are taken as rounded: each is divided
 by the sum. A smaller sum gets a no-change branch, a larger one is an error."""
+
+
+_COMPARATORS: Mapping[str, mf.Comparator] = {"<": "<", "<=": "<=", "=": "=", ">=": ">=", ">": ">"}
+_OPERATORS: Mapping[str, me.Operator]
+_OPERATORS = {
+    "increase": "increase",
+    "decrease": "decrease",
+    "assign": "assign",
+    "scale-up": "scale-up",
+    "scale-down": "scale-down",
+}
 
 
 def inner_scope(names: Names, groups: ast.TypedList, scope: Scope) -> tuple[tuple[Parameter, ...], Scope]:
@@ -56,7 +68,7 @@ def unsupported(names: Names, node: ast.Unsupported) -> None:
         "BBT0212",
         f"{node.construct} is not supported",
         node.span,
-        "bbtc reads conditions over true, false and unknown facts, and costs and rewards as numbers",
+        "bbtc reads conditions over true, false and unknown facts and over whole numbers",
     )
 
 
@@ -93,6 +105,11 @@ def formula(names: Names, node: ast.Formula, scope: Scope) -> mf.Formula:
         case ast.Equality(left, right, span):
             first, second = names.term(left, scope), names.term(right, scope)
             return mf.Equal(first[0], second[0], span) if first and second else mf.ALWAYS
+        case ast.Comparison(operator, left, right, span):
+            one, other = amount(names, left, scope), amount(names, right, scope)
+            if one is None or other is None:
+                return mf.ALWAYS
+            return mf.Compare(_COMPARATORS[operator], one, other, _numbers(names, one, other), span)
         case ast.Not(part, span):
             return mf.Not(formula(names, part, scope), span)
         case ast.And(parts, span):
@@ -317,27 +334,57 @@ def _decimal(value: Fraction) -> str:
 def _fluent_effect(names: Names, node: ast.FluentEffect, scope: Scope) -> me.Effect:
     key = node.fluent.name.key
     to = "cost" if key in names.costs else "reward" if key in names.rewards else None
-    if to is None or node.fluent.args or node.operator not in ("increase", "decrease"):
-        near = nearest(key, sorted(names.costs | names.rewards)) if to is None else None
+    if to is None:
+        return _change(names, node, scope)
+    if node.fluent.args or node.operator not in ("increase", "decrease"):
         names.report.error(
             "BBT0212",
             f"the numeric effect `{node.operator} {node.fluent.name.text}` is not supported",
             node.span,
-            f"did you mean `{near}`?"
-            if near is not None
-            else "numbers are read as costs and rewards: `increase` or `decrease` of the fluent that the "
-            "metric names, `total-cost` or `reward`",
+            "what counts costs or rewards is read by the metric alone: `increase` or `decrease` it",
         )
         return me.NOTHING
     found = amount(names, node.amount, scope)
     if found is None or key not in names.counted:
         return me.NOTHING
     sign = 1 if node.operator == "increase" else -1
+    weight = names.weights.get(key, Fraction(1))
+    if weight != 1:
+        found = me.Arithmetic("*", (me.Constant(weight), found), node.span)
     return me.Add("cost" if to == "cost" else "reward", found, sign, node.span)
 
 
+def _change(names: Names, node: ast.FluentEffect, scope: Scope) -> me.Effect:
+    """A change of a number that is part of the state."""
+    key = node.fluent.name.key
+    near = None if key in names.functions else nearest(key, sorted(names.costs | names.rewards))
+    if near is not None:
+        message = f"the numeric effect `{node.operator} {node.fluent.name.text}` is not supported"
+        names.report.error("BBT0212", message, node.span, f"did you mean `{near}`?")
+        return me.NOTHING
+    target, found = amount(names, node.fluent, scope), amount(names, node.amount, scope)
+    if not isinstance(target, me.FunctionValue) or found is None:
+        return me.NOTHING
+    own, read = _numbers(names, target), _numbers(names, found)
+    operator = _OPERATORS[node.operator.lower()]
+    return me.Change(target.function, target.args, operator, found, own, read, node.span)
+
+
+def _numbers(names: Names, *amounts: me.Amount) -> tuple[mf.Atom, ...]:
+    """What stands for the values of functions until it is settled how they are written."""
+    found: dict[mf.Atom, None] = {}
+    for value in (value for each in amounts for value in functions(each)):
+        function = names.functions[value.function]
+        name = md.number_predicate(value.function)
+        names.predicates.setdefault(
+            name, md.Predicate(name, function.parameters, span=function.span, inferred=True)
+        )
+        found[mf.Atom(name, value.args, value.span)] = None
+    return tuple(found)
+
+
 def amount(names: Names, node: ast.NumericExpression, scope: Scope) -> me.Amount | None:
-    """A numeric expression over static functions, or None after an error."""
+    """A numeric expression, or None after an error."""
     match node:
         case ast.Number():
             return me.Constant(node.value)
@@ -348,7 +395,10 @@ def amount(names: Names, node: ast.NumericExpression, scope: Scope) -> me.Amount
                 return None
             if name.key in names.costs or name.key in names.rewards:
                 names.report.error(
-                    "BBT0212", f"reading the numeric fluent `{name.text}` is not supported", span
+                    "BBT0212",
+                    f"reading the numeric fluent `{name.text}` is not supported",
+                    span,
+                    "what counts costs or rewards is read by the metric alone",
                 )
                 return None
             found = names.arguments("function", name, function, args, scope, span=span)

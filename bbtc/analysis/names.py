@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Protocol, TypeVar
 
 from bbtc.analysis.undeclared import Uses, likely, slip, uses_of
@@ -73,6 +74,10 @@ class Names:
     rewards: frozenset[str] = frozenset({"reward"})
     counted: frozenset[str] = frozenset({"total-cost", "reward"})
     """Those of both that count: the one that a metric names takes the place of its like."""
+    weights: dict[str, Fraction] = field(default_factory=dict)
+    """How much each of them counts; 1 where nothing is said."""
+    per_action: Fraction = Fraction(0)
+    """What each action counts besides."""
     section: str = ""
     definitions: tuple[ast.Definition, ...] = ()
     derived: frozenset[str] = frozenset()

@@ -90,7 +90,7 @@ def _collect(
             _collect(names, inner, parameters, (*conditions, condition), rules)
         case me.ForEach(more, inner):
             _collect(names, inner, (*parameters, *more), conditions, rules)
-        case me.Add():
+        case me.Add() | me.Change():
             names.report.error("BBT0421", "what is observed adds nothing to costs", effect.span)
         case _:
             assert_never(effect)

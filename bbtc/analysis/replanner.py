@@ -177,7 +177,7 @@ def one_value(
         case me.Choice(branches):
             made = (replace(each, effect=one_value(found, each.effect, denied)) for each in branches)
             return replace(effect, branches=tuple(made))
-        case me.Set() | me.Add():
+        case me.Set() | me.Add() | me.Change():
             return effect
         case _:
             assert_never(effect)
@@ -248,7 +248,7 @@ def _collect(
             _collect(names, inner, parameters, (*conditions, condition), rules)
         case me.ForEach(more, inner):
             _collect(names, inner, (*parameters, *more), conditions, rules)
-        case me.Choice() | me.Add():
+        case me.Choice() | me.Add() | me.Change():
             message = "a sensing model with chance, or with costs, is not supported"
             hint = "a noisy reading is written `:observe (probabilistic q (p))`"
             names.report.error("BBT0212", message, effect.span, hint)

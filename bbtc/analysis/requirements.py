@@ -140,7 +140,13 @@ def _in_domain(model: md.Model) -> Iterator[_Use]:
     yield from ((":derived-predicates", rule.span) for rule in model.rules)
     declared = (each for each in model.predicates.values() if each.name not in model.thresholds)
     yield from ((":unknown", each.span) for each in declared if each.declared_three_valued)
-    for function in model.functions.values():
+    timing = {
+        name for each in model.schemas.values() for name in me.functions_timing(each.duration, each.timeout)
+    }
+    for function in (each for each in model.functions.values() if each.name not in timing):
+        if function.range is not None or md.number_predicate(function.name) in model.predicates:
+            yield ":numeric-fluents", function.span
+            continue
         yield ":rewards" if function.name == "reward" else ":action-costs", function.span
 
 
@@ -163,6 +169,8 @@ def _in_formula(formula: mf.Formula) -> Iterator[_Use]:
             yield ":unknown", span
         case mf.Equal(_, _, span):
             yield ":equality", span
+        case mf.Compare(span=span):
+            yield ":numeric-fluents", span
         case mf.Not(part, span):
             yield _NOT_EQUAL if isinstance(part, mf.Equal) else ":negative-preconditions", span
             yield from _in_formula(part)
@@ -190,6 +198,8 @@ def _in_effect(effect: me.Effect) -> Iterator[_Use]:
                     yield ":unknown", span
             case me.Add(to, _, _, span):
                 yield ":rewards" if to == "reward" else ":action-costs", span
+            case me.Change(span=span):
+                yield ":numeric-fluents", span
             case me.Together():
                 pass
             case me.When(condition, _, span):

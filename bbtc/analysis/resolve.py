@@ -9,7 +9,8 @@ from fractions import Fraction
 from typing_extensions import assert_never
 
 from bbtc.analysis import bodies, exogenous, facts, formulas, po_pddl, replanner, truth_words
-from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections
+from bbtc.analysis.declare import GOAL_FLUENTS, declare, sections, weighted
+from bbtc.analysis.durative import with_sequential
 from bbtc.analysis.initial import initial
 from bbtc.analysis.names import Names, Signature
 from bbtc.analysis.timing import timed
@@ -54,6 +55,7 @@ def resolve(
     sum differs from 1 by at most 1e-9 are taken as rounded and divided by their sum; a smaller sum
     gets an explicit no-change branch.
     """
+    domain = with_sequential(domain, problem, report)
     definitions = (domain,) if problem is None else (domain, problem)
     names = Names(report, definitions=definitions, lenient=lenient)
     _check_sections(report, domain, problem)
@@ -67,6 +69,9 @@ def resolve(
         names.section = f"action {signature.name}"
         made = _schema(names, signature, action)
         made = replace(made, effect=replanner.one_value(variables, made.effect))
+        if names.per_action:
+            each = me.Add("cost", me.Constant(names.per_action), span=action.span)
+            made = replace(made, effect=me.Together((made.effect, each)))
         if sensing is not None and action.observe is None:
             made = replace(made, observe=replanner.told(shared, sensing.span), observe_span=sensing.span)
         schemas[signature.name] = replace(made, told=(*made.told, *told))
@@ -209,6 +214,7 @@ def _schema(names: Names, signature: Signature, node: ast.Action) -> md.Schema:
         None if node.observe is None else node.observe.span,
         node.repeats,
         told,
+        node.uninterruptible,
         during,
         me.NOTHING if node.on_abort is None else formulas.effect(names, node.on_abort, scope),
         span=node.span,
@@ -445,6 +451,9 @@ def _is_reward(names: Names, metric: ast.Metric) -> bool:
     )
 
 
+_COUNTED = frozenset({"total-cost", "total-time"})
+
+
 def _check_metric(names: Names, metric: ast.Metric) -> None:
     """Refuse a metric that is not what is counted."""
     expression, minimise = metric.expression, metric.direction == "minimize"
@@ -461,4 +470,9 @@ def _check_metric(names: Names, metric: ast.Metric) -> None:
             if not declared and key not in ("total-cost", "reward"):
                 names.unknown("BBT0220", "function", expression.name, names.functions)
             return
+    elif minimise and (terms := weighted(expression, names.rewards)) is not None:
+        unknown = [key for key in terms if key not in names.functions and key not in _COUNTED]
+        if not unknown:
+            return
+        hint = f"`{unknown[0]}` is no function; declared: {', '.join(names.functions) or 'none'}"
     names.report.error("BBT0212", "this metric is not supported", metric.span, hint)

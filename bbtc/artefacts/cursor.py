@@ -178,6 +178,12 @@ class At:
             raise self._wrong("a whole number from 1 to 1000000")
         return self.value
 
+    def integer(self) -> int:
+        """A whole number, which may be below 0."""
+        if isinstance(self.value, bool) or not isinstance(self.value, int):
+            raise self._wrong("a whole number")
+        return self.value
+
     def word(self, *choices: str) -> str:
         """One of a few strings."""
         text = self.string()

@@ -10,6 +10,7 @@ from bbtc.artefacts.conditions import condition_to_json
 from bbtc.artefacts.numbers import figure_text
 from bbtc.belief.draws import Values
 from bbtc.belief.tick import NodeStatus
+from bbtc.ground.describe import differences, values_in_words
 from bbtc.kleene import Truth
 from bbtc.tree.nodes import Tree
 
@@ -85,10 +86,9 @@ def _worst_world(worst: WorstWorld) -> dict[str, Any]:
     return {"success": figure_text(worst.success), "facts": facts}
 
 
-def values_to_json(tree: Tree, values: Values) -> dict[str, str]:
-    """The value of each variable, by name."""
-    pairs = zip(tree.task.variables, values, strict=False)  # behind them: what is believed
-    return {variable.name: Truth(value).word for variable, value in pairs}
+def values_to_json(tree: Tree, values: Values) -> dict[str, str | int]:
+    """The value of each variable, and of each number, by name."""
+    return values_in_words(tree.task.variables, values)
 
 
 def failing_run_to_json(tree: Tree, failing: FailingRun) -> dict[str, Any]:
@@ -103,11 +103,7 @@ def failing_run_to_json(tree: Tree, failing: FailingRun) -> dict[str, Any]:
             {
                 "node": step.node.id,
                 "action": step.node.action,
-                "changes": {
-                    variable.name: Truth(new).word
-                    for variable, old, new in zip(variables, before, step.values, strict=False)
-                    if old != new
-                },
+                "changes": differences(variables, before, step.values),
             }
             for before, step in zip(befores, run.steps, strict=False)
         ],

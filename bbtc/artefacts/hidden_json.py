@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from typing_extensions import Self
 
-from bbtc.artefacts.conditions import condition_from_json, condition_to_json, variable_from_json
+from bbtc.artefacts.conditions import (
+    condition_from_json,
+    condition_to_json,
+    variable_from_json,
+)
 from bbtc.artefacts.cursor import At, check_distinct, clip, optional
 from bbtc.artefacts.numbers import given_text
 from bbtc.artefacts.prior_json import prior_from_json, prior_to_json
@@ -20,10 +24,12 @@ from bbtc.ground.task import (
     Component,
     Factor,
     Knowledge,
+    NumberVariable,
     Observation,
     Task,
     TrueWorld,
     Variable,
+    numbers_of,
     split_name,
 )
 
@@ -85,12 +91,14 @@ class HiddenReader(ABC):
     variables: tuple[Variable, ...]
     index: Mapping[str, int]
     components: tuple[Component, ...] = ()
+    numbers: Mapping[str, NumberVariable] = field(default_factory=dict)
 
     @classmethod
     def of(cls, variables: Iterable[Variable]) -> Self:
         """For some variables."""
         listed = tuple(variables)
-        return cls(listed, {variable.name: number for number, variable in enumerate(listed)})
+        index = {variable.name: number for number, variable in enumerate(listed)}
+        return cls(listed, index, numbers={number.name: number for number in numbers_of(listed)})
 
     @abstractmethod
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
@@ -98,7 +106,7 @@ class HiddenReader(ABC):
 
     def condition(self, at: At) -> Condition:
         """A condition over the variables."""
-        return condition_from_json(at, self.index)
+        return condition_from_json(at, self.index, self.numbers)
 
     def component(self, at: At) -> Component:
         """A component."""

@@ -20,6 +20,9 @@ from bbtc.model.domain import Model
 from bbtc.source import SourceFile, Span
 from bbtc.syntax.ast import Document
 
+_LATER = frozenset(("timing", "duration", "timeout", "during", "on_abort", "exogenous"))
+"""Fields that came later: they stand only where they say something."""
+
 
 def syntax_to_json(documents: Sequence[Document]) -> dict[str, Any]:
     """The syntax trees of the files, in the order given."""
@@ -39,7 +42,11 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Span):
         return [*value.source.position(value.start), *value.source.position(value.end)]
     if is_dataclass(value) and not isinstance(value, type):
-        content = {f.name: getattr(value, f.name) for f in fields(value) if not f.name.startswith("_")}
+        content = {
+            f.name: getattr(value, f.name)
+            for f in fields(value)
+            if not f.name.startswith("_") and (f.name not in _LATER or getattr(value, f.name) != f.default)
+        }
         return {
             "node": type(value).__name__,
             **{name: _plain(part) for name, part in content.items() if not isinstance(part, SourceFile)},

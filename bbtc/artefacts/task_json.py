@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
-from typing_extensions import assert_never
-
+from bbtc.artefacts import numbers_json
+from bbtc.artefacts.bodies_json import body_to_json
 from bbtc.artefacts.conditions import condition_to_json, number_of
 from bbtc.artefacts.cursor import At, Faults, check_distinct, clip, optional, run_reader
 from bbtc.artefacts.duration_json import (
@@ -33,7 +33,9 @@ from bbtc.artefacts.numbers import given_text
 from bbtc.artefacts.prior_json import check_sum
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.condition import TRUE, Condition
+from bbtc.ground.describe import values_in_words
 from bbtc.ground.events import clashes
+from bbtc.ground.numbers.occurrences import with_digit_effects
 from bbtc.ground.task import (
     Body,
     BodyAction,
@@ -84,11 +86,13 @@ def task_to_json(task: Task) -> Json:
         value["goal_reward"] = given_text(task.goal_reward)
     if task.metric != "cost":
         value["metric"] = task.metric
-    value["variables"] = [_variable_to_json(variable) for variable in task.variables]
+    value["variables"] = [_variable_to_json(each) for each in task.variables if each.digit is None]
+    if task.numbers:
+        value["numbers"] = [numbers_json.number_to_json(number) for number in task.numbers]
     value["initial"] = [
         {
             "p": given_text(state.probability),
-            "assign": {v.name: truth.word for v, truth in zip(task.variables, state.values, strict=True)},
+            "assign": values_in_words(task.variables, state.values),
         }
         for state in task.initial
     ]
@@ -141,6 +145,8 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
     }
     if action.changes:
         value["changes"] = [_change_to_json(change, task) for change in action.changes]
+    if action.uninterruptible:
+        value["uninterruptible"] = True
     if action.duration is not None:
         value["duration"] = duration_to_json(action.duration)
     if action.timeout is not None:
@@ -160,7 +166,8 @@ def _event_to_json(event: GroundEvent, variables: Sequence[Variable]) -> Json:
         "precondition": condition_to_json(event.precondition, variables),
         **_chance_to_json(event.factors, variables),
     }
-    return value | ({"round": event.round} if event.round else {})
+    value |= {"round": event.round} if event.round else {}
+    return value | ({"per": event.rate} if event.rate != "action" else {})
 
 
 def _chance_to_json(factors: tuple[Factor, ...], variables: Sequence[Variable]) -> Json:
@@ -191,6 +198,11 @@ def _outcome_to_json(outcome: Outcome, variables: Sequence[Variable]) -> Json:
         value["charges"] = [_charge_to_json(charge, variables) for charge in outcome.charges]
     if outcome.timed_out:
         value["timed_out"] = True
+    if outcome.changes:
+        # What they do to digits is worked out again when they are read.
+        shown = numbers_json.without_digits(outcome.effects, variables)
+        value["effects"] = [_effect_to_json(effect, variables) for effect in shown]
+        value["numbers"] = numbers_json.changes_to_json(outcome.changes, variables)
     return value
 
 
@@ -221,24 +233,8 @@ def _template_to_json(template: GroundTemplate, variables: Sequence[Variable]) -
         "args": list(template.args),
         "precondition": condition_to_json(template.precondition, variables),
         **_chance_to_json(template.factors, variables),
-        "body": _body_to_json(template.body, variables),
+        "body": body_to_json(template.body, variables),
     }
-
-
-def _body_to_json(body: Body, variables: Sequence[Variable]) -> Json:
-    match body:
-        case BodyControl(kind, children, attempts):
-            counted = {} if attempts is None else {"attempts": attempts}
-            inner = [_body_to_json(child, variables) for child in children]
-            return {"type": kind, **counted, "children": inner}
-        case BodyCondition(condition):
-            return {"type": "condition", "condition": condition_to_json(condition, variables)}
-        case BodyAction(action):
-            return {"type": "action", "action": action}
-        case BodyTemplate(template):
-            return {"type": "template", "template": template}
-        case _:
-            assert_never(body)
 
 
 # --- in --------------------------------------------------------------------------------------
@@ -279,6 +275,7 @@ def read_task(at: At, faults: Faults) -> Task:
     members = at.members(
         ["format", "version", "domain", "problem", "variables", "initial", "goal", "actions"],
         [
+            "numbers",
             "goal_probability",
             "goal_reward",
             "metric",
@@ -291,6 +288,8 @@ def read_task(at: At, faults: Faults) -> Task:
         ],
     )
     variables = faults.each(members["variables"].elements(), _variable)
+    for digits in faults.each(optional(members, "numbers"), numbers_json.digits_from_json):
+        variables += digits
     faults.stop_if_any()  # every mention of a variable would be a fault of its own
     variables.sort(key=lambda variable: variable.name)
     check_distinct(members["variables"], [variable.name for variable in variables])
@@ -394,9 +393,9 @@ def _check_name(at: At, symbol: str, args: tuple[str, ...]) -> None:
 
 def _signature(at: At) -> Signature:
     members = at.members(["kind", "symbol", "parameters"])
-    kind: Literal["predicate", "action"] = (
-        "action" if members["kind"].word("predicate", "action") == "action" else "predicate"
-    )
+    kinds: Mapping[str, Literal["predicate", "action", "function"]]
+    kinds = {"predicate": "predicate", "action": "action", "function": "function"}
+    kind = kinds[members["kind"].word(*kinds)]
     return Signature(kind, members["symbol"].string(), members["parameters"].strings())
 
 
@@ -416,6 +415,9 @@ class _Reader(HiddenReader):
     def _assignment(self, at: At) -> dict[int, Truth]:
         values: dict[int, Truth] = {}
         for name, value in at.entries():
+            if name in self.numbers:
+                values.update(numbers_json.digits_of_value(value, self.numbers[name]))
+                continue
             variable = number_of(value, name, self.index)
             truth = Truth.from_word(value.word("true", "false", "unknown"))
             if truth is Truth.UNKNOWN and not self.variables[variable].three_valued:
@@ -426,7 +428,17 @@ class _Reader(HiddenReader):
     def action(self, at: At) -> GroundAction:
         members = at.members(
             ["name", "schema", "args", "cost", "precondition"],
-            ["outcomes", "factors", "oneof", "changes", "while", "on_abort", "duration", "timeout"],
+            [
+                "outcomes",
+                "factors",
+                "oneof",
+                "changes",
+                "uninterruptible",
+                "while",
+                "on_abort",
+                "duration",
+                "timeout",
+            ],
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -441,6 +453,7 @@ class _Reader(HiddenReader):
             factors,
             members["cost"].given(),
             tuple(self.change(each) for each in optional(members, "changes")),
+            uninterruptible="uninterruptible" in members and members["uninterruptible"].flag(),
             during=self.condition(members["while"]) if "while" in members else None,
             on_abort=self._abort(members["on_abort"]) if "on_abort" in members else (),
             duration=duration_from_json(members["duration"]) if "duration" in members else None,
@@ -452,7 +465,7 @@ class _Reader(HiddenReader):
 
     def event(self, at: At) -> GroundEvent:
         members = at.members(
-            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round"]
+            ["name", "schema", "args", "precondition"], ["outcomes", "factors", "oneof", "round", "per"]
         )
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
@@ -460,7 +473,14 @@ class _Reader(HiddenReader):
         if isinstance(number, bool) or not isinstance(number, int) or number < 0:
             raise members["round"].fault("BBT0604", "must be the number of a round, from 0 on")
         factors = self.chance(at, members)
-        return GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        event = GroundEvent(schema, args, self.condition(members["precondition"]), factors, number)
+        if "per" not in members or members["per"].word("action", "second") == "action":
+            return event
+        if any(sum(each.does_something for each in factor.outcomes) > 1 for factor in factors):
+            raise members["per"].fault(
+                "BBT0604", "one outcome of each factor at most does something each second"
+            )
+        return replace(event, rate="second")
 
     def chance(self, at: At, members: Mapping[str, At], depth: int = 0) -> tuple[Factor, ...]:
         """The factors of an object with either ``outcomes`` or ``factors``."""
@@ -481,10 +501,12 @@ class _Reader(HiddenReader):
         return Factor(outcomes, oneof)
 
     def _outcome(self, at: At, depth: int) -> Outcome:
-        members = at.members(["p", "effects"], ["factors", "oneof", "reward", "cost", "charges", "timed_out"])
+        members = at.members(
+            ["p", "effects"], ["factors", "oneof", "reward", "cost", "charges", "timed_out", "numbers"]
+        )
         if depth > MAX_NESTING:
             raise at.fault("BBT0605", f"chance is nested in chance at most {MAX_NESTING} times")
-        return Outcome(
+        outcome = Outcome(
             members["p"].given_probability(zero=False),
             tuple(self._effect(element) for element in members["effects"].elements()),
             self.chance(at, members, depth + 1) if "factors" in members or "oneof" in members else (),
@@ -493,6 +515,11 @@ class _Reader(HiddenReader):
             tuple(self._charge(element) for element in optional(members, "charges")),
             "timed_out" in members and members["timed_out"].flag(),
         )
+        if "numbers" not in members:
+            return outcome
+        changes = numbers_json.changes_from_json(members["numbers"], self.numbers, self.condition)
+        sizes = {number.digits: number.high - number.low + 1 for number in self.numbers.values()}
+        return with_digit_effects(replace(outcome, changes=changes), sizes)
 
     def _charge(self, at: At) -> Charge:
         members = at.members(["when"], ["cost", "reward"])

@@ -206,7 +206,9 @@ class _Reader:
 
     def _condition(self, at: At) -> ConditionNode:
         members = at.members(["id", "type", "condition"], _LABELS)
-        condition = condition_from_json(members["condition"], self.task.variable_index)
+        condition = condition_from_json(
+            members["condition"], self.task.variable_index, self.task.number_by_name
+        )
         return ConditionNode(members["id"].string(), condition, *_labels(members))
 
     def _action(self, at: At) -> ActionNode:

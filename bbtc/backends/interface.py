@@ -17,17 +17,22 @@ from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, walk
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A condition or action to implement. ``three_valued`` conditions can be unknown."""
+    """A condition, a number or an action to implement. ``three_valued`` conditions can be unknown."""
 
     symbol: Symbol
     parameters: tuple[str, ...]
     three_valued: bool = False
 
+    @property
+    def counts(self) -> bool:
+        """Is it a number?"""
+        return self.symbol.kind == "function"
+
 
 @dataclass(frozen=True)
 class Interface:
-    """The leaves a tree uses, sorted by name; ``reads`` are the variables that conditions and guards ask the
-    robot for; the conditions of ``deduced`` ask the monitor alone."""
+    """The leaves a tree uses, sorted by name, numbers among the conditions; ``reads`` are the variables that
+    conditions and guards ask the robot for; the conditions of ``deduced`` ask the monitor alone."""
 
     conditions: tuple[Leaf, ...]
     actions: tuple[Leaf, ...]
@@ -46,7 +51,9 @@ class Interface:
 
 
 def variable_symbol(variable: Variable) -> Symbol:
-    """The condition leaf that reads a variable."""
+    """The condition leaf that reads a variable: a fact, or the number that it is a digit of."""
+    if variable.digit is not None:
+        return Symbol("function", variable.digit.function, len(variable.args))
     return Symbol("predicate", variable.predicate, len(variable.args))
 
 
@@ -94,8 +101,18 @@ def interface_of(tree: Tree) -> Interface:
     )
 
 
+BOUNDS = ("at_least", "at_most")
+"""What a node that reads a number is given besides its arguments: what it is to be compared with."""
+
+
 def parameters_of(task: Task, symbol: Symbol) -> tuple[str, ...]:
-    """The parameter names of a leaf: those that the domain declares, or else ``arg``, ``arg1``, …."""
+    """The parameter names of a leaf: those that the domain declares, or else ``arg``, ``arg1``, …. None of a
+    number is called as one of its :data:`BOUNDS`."""
+    names = _parameters_of(task, symbol)
+    return tuple(f"{name}_" if symbol.kind == "function" and name in BOUNDS else name for name in names)
+
+
+def _parameters_of(task: Task, symbol: Symbol) -> tuple[str, ...]:
     for signature in task.signatures:
         if (signature.kind, signature.symbol, len(signature.parameters)) == (
             symbol.kind,

@@ -4,7 +4,8 @@ A *plain* name is made of ASCII letters and digits in words that ``-`` or ``_`` 
 with a letter. It becomes ``LightOn`` (camel) or ``light_on`` (snake), as does nearly every name:
 
 1. A predicate that shares its identifier with an action, or has a reserved one, gets the prefix
-   ``Is``/``is_``; an action with a reserved one ``Do``/``do_``; a parameter ``arg_``.
+   ``Is``/``is_``, and so a number ``Get``/``get_``; an action with a reserved one ``Do``/``do_``; a parameter
+   ``arg_``.
 2. A name that is not plain, too long, or still shares its identifier (``at-a``, ``at_a``, ``At_a``;
    letter case does not tell identifiers apart) gets ``_`` and the first digits of its SHA-256.
 
@@ -33,7 +34,7 @@ PYTHON_RESERVED = frozenset(keyword.kwlist) | {"self", "bool", "str", "cancel", 
 
 _ROS_PORTS = ("action_name", "service_name", "topic_name")  # ports that leaves of behaviortree_ros2 have
 
-Kind = Literal["predicate", "action", "parameter"]
+Kind = Literal["predicate", "function", "action", "parameter"]
 Style = Literal["camel", "snake"]
 
 
@@ -61,7 +62,7 @@ def identifiers(symbols: Iterable[Symbol], style: Style, reserved: Collection[st
         alone = sum(peer.kind == symbol.kind for peer in peers) == 1
         if not _is_plain(symbol.name) or not alone:
             rank = 2
-        elif base.casefold() in banned or (symbol.kind == "predicate" and len(peers) > 1):
+        elif base.casefold() in banned or (symbol.kind != "action" and len(peers) > 1):
             rank = 1
         else:
             rank = 0
@@ -159,6 +160,8 @@ def _candidates(symbol: Symbol, style: Style) -> tuple[str, str, str]:
     match symbol.kind:
         case "predicate":
             prefix = "is"
+        case "function":
+            prefix = "get"
         case "action":
             prefix = "do"
         case "parameter":

@@ -19,6 +19,7 @@ from bbtc.ground.condition import (
     Known,
     Not,
     Or,
+    Within,
     leaves,
     replaced,
 )
@@ -95,7 +96,7 @@ def normal(task: Task, condition: Condition) -> Condition:
             return TRUE
         return FALSE if leaf.value is Truth.UNKNOWN else leaf
 
-    return replaced(condition, asked)
+    return replaced(condition, asked, numbers=lambda number: number)
 
 
 def written(task: Task, condition: Condition) -> Condition:
@@ -113,7 +114,7 @@ def _ordered(task: Task, condition: Condition) -> Condition:
             if sum(unknowable) == 1:
                 inner.append(inner.pop(unknowable.index(True)))
             return replace(condition, parts=tuple(inner))
-        case Is() | Known() | Not() | Constant():
+        case Is() | Known() | Within() | Not() | Constant():
             return condition
         case _:
             assert_never(condition)
@@ -160,7 +161,7 @@ def _check_depth(condition: Condition) -> None:
                 stack.extend((p, level + 1) for p in parts)
             case Not(inner):
                 stack.append((inner, level + 1))
-            case Is() | Known() | Constant():
+            case Is() | Known() | Within() | Constant():
                 pass
             case _:
                 assert_never(part)

@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 from bbtc.belief.draws import Draw, Values, add, compile_factor, product_of
 from bbtc.belief.hidden import compile_change, told_first
-from bbtc.ground.condition import compile_condition
+from bbtc.ground.condition import TRUE, compile_condition
 from bbtc.ground.task import NO_CHANGE, ONE, ZERO, GroundAction, GroundEvent, Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -70,6 +70,23 @@ class Bounded:
             self._limits.check_time("working out what an action leads to")
 
 
+def compile_parts(task: Task, action: GroundAction, limits: Limits) -> tuple[Transition, Transition]:
+    """An action with events that may end it, in two parts: what happens where it goes on to its end, and
+    where it is aborted. The probabilities of the results of both sum to 1, together."""
+    bounded = Bounded(limits)
+    own, abort = _compile_own(task, action, bounded), _compile_abort(action, bounded)
+    events = _compile_events(task.rounds(action), bounded)
+    goes_on = compile_condition(action.during or TRUE)
+
+    def part(ends: Transition, *, aborted: bool) -> Transition:
+        def some(values: Values) -> tuple[Result, ...]:
+            return () if (goes_on(values) != Truth.TRUE) is not aborted else ends(values)
+
+        return _cached(lambda values: _merged(_then(events(values), some), bounded))
+
+    return part(own, aborted=False), part(abort, aborted=True)
+
+
 def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transition:
     """An action of the task, and the events that happen with it, as a function from values to the results:
     equal results merged, most probable first (ties by values). Results are cached per assignment. The
@@ -79,15 +96,11 @@ def compile_action(task: Task, action: GroundAction, limits: Limits) -> Transiti
     own = _compile_own(task, action, bounded)
     if not task.events and action.during is None:
         return own
-    events = _compile_events(task, bounded)
     if action.during is None:
+        events = _compile_events(task.rounds(action), bounded)
         return _cached(lambda values: _merged(_then(own(values), events), bounded))
-    goes_on, abort = compile_condition(action.during), _compile_abort(action, bounded)
-
-    def interrupted(values: Values) -> tuple[Result, ...]:
-        return own(values) if goes_on(values) == Truth.TRUE else abort(values)
-
-    return _cached(lambda values: _merged(_then(events(values), interrupted), bounded))
+    ends, aborted = compile_parts(task, action, limits)
+    return _cached(lambda values: _merged((*ends(values), *aborted(values)), bounded))
 
 
 def _compile_own(task: Task, action: GroundAction, bounded: Bounded) -> Transition:
@@ -104,30 +117,30 @@ def _compile_abort(action: GroundAction, bounded: Bounded) -> Transition:
     return _cached(lambda values: results_of(values, action.cost, product_of(values, drawers, bounded.spend)))
 
 
-def _compile_events(task: Task, bounded: Bounded) -> Transition:
+def _compile_events(rounds: Iterable[tuple[GroundEvent, ...]], bounded: Bounded) -> Transition:
     """The events of one draw, round by round."""
 
     def compile_round(events: tuple[GroundEvent, ...]) -> Transition:
-        compiled = [
+        own = [
             (compile_condition(event.precondition), [compile_factor(f, bounded.spend) for f in event.factors])
             for event in events
         ]
 
         def happen(values: Values) -> tuple[Result, ...]:
-            due = (each for ready, drawers in compiled if ready(values) == Truth.TRUE for each in drawers)
+            due = (each for ready, drawers in own if ready(values) == Truth.TRUE for each in drawers)
             return results_of(values, ZERO, product_of(values, due, bounded.spend))
 
         return _cached(happen)
 
-    rounds = [compile_round(events) for events in task.rounds]
+    compiled = [compile_round(events) for events in rounds]
 
     def all_rounds(values: Values) -> tuple[Result, ...]:
         results: tuple[Result, ...] = (Result(ONE, ZERO, ZERO, values),)
-        for happen in rounds:
+        for happen in compiled:
             results = _merged(_then(results, happen), bounded)
         return results
 
-    return _cached(all_rounds) if len(rounds) > 1 else rounds[0] if rounds else all_rounds
+    return _cached(all_rounds) if len(compiled) > 1 else compiled[0] if compiled else all_rounds
 
 
 def _then(results: Iterable[Result], after: Transition) -> Iterator[Result]:

@@ -11,6 +11,7 @@ from bbtc.cli.wording import stopped
 from bbtc.disturbance.intervals import Interval
 from bbtc.disturbance.perturbed import PerturbedRuns
 from bbtc.disturbance.recovery import Recovery
+from bbtc.ground.condition import number_in
 from bbtc.kleene import Truth
 from bbtc.rounding import decimal
 from bbtc.tree.nodes import Tree
@@ -83,7 +84,8 @@ def recovery_lines(tree: Tree, found: Recovery, whole: bool) -> list[str]:
 def _state(tree: Tree, values: Values) -> str:
     """A state in words: what is true and what is unknown, in short."""
     pairs = list(zip(tree.task.variables, values, strict=True))
-    told = [variable.name for variable, value in pairs if value == Truth.TRUE]
+    told = [variable.name for variable, value in pairs if value == Truth.TRUE and variable.digit is None]
+    told += [f"{each.name} = {each.low + number_in(each.digits, values)}" for each in tree.task.numbers]
     told += [f"unknown {variable.name}" for variable, value in pairs if value == Truth.UNKNOWN]
     more = f" and {len(told) - _MOST_FACTS} more" if len(told) > _MOST_FACTS else ""
     return ", ".join(told[:_MOST_FACTS]) + more if told else "nothing true"

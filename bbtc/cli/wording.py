@@ -10,7 +10,7 @@ from bbtc.artefacts.numbers import exact
 from bbtc.belief.tick import NodeStatus
 from bbtc.cli.counting import counted
 from bbtc.ground.condition import Condition
-from bbtc.ground.describe import describe
+from bbtc.ground.describe import describe, differences
 from bbtc.ground.task import Factor, Task
 from bbtc.kleene import Truth
 from bbtc.printable import printable
@@ -32,8 +32,8 @@ _MOST_STEPS = 12  # actions told of one run
 
 def changes(tree: Tree, before: bytes, after: bytes) -> str:
     """``seen(soda) = true, …``: the variables that differ, with their new values."""
-    pairs = zip(tree.task.variables, before, after, strict=False)  # behind them: what is believed
-    changed = [f"{variable.name} = {Truth(new).word}" for variable, old, new in pairs if old != new]
+    found = differences(tree.task.variables, before, after)
+    changed = [f"{name} = {value}" for name, value in found.items()]
     return printable(", ".join(changed)) or "no change"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -25,6 +25,22 @@ class Known:
     """The two-valued test ``(known p)``."""
 
     variable: int
+
+
+@dataclass(frozen=True, slots=True)
+class Within:
+    """A number is from ``low`` to ``high``. It is written in binary digits, which are two-valued variables,
+    the least first, and counted from the least value it can have (:class:`bbtc.ground.task.NumberVariable`).
+    Made by :func:`within`, which knows constants."""
+
+    digits: tuple[int, ...]
+    low: int
+    high: int
+
+    @property
+    def most(self) -> int:
+        """What the digits can say at most."""
+        return (1 << len(self.digits)) - 1
 
 
 class _Compound:
@@ -85,9 +101,47 @@ class Constant:
     value: bool
 
 
-Condition: TypeAlias = Is | Known | And | Or | Not | Constant
+Condition: TypeAlias = Is | Known | Within | And | Or | Not | Constant
 TRUE = Constant(True)
 FALSE = Constant(False)
+
+
+def within(digits: tuple[int, ...], low: int, high: int) -> Condition:
+    """That a number is from ``low`` to ``high``, as far as its digits can say that."""
+    most = (1 << len(digits)) - 1
+    low, high = max(low, 0), min(high, most)
+    if low > high:
+        return FALSE
+    return TRUE if (low, high) == (0, most) else Within(digits, low, high)
+
+
+def in_digits(number: Within) -> Condition:
+    """The same condition over the digits, one by one."""
+    return _spelt(number.digits, number.low, number.high)
+
+
+def _spelt(digits: tuple[int, ...], low: int, high: int) -> Condition:
+    most = (1 << len(digits)) - 1
+    if low > high:
+        return FALSE
+    if (low, high) == (0, most):
+        return TRUE
+    first, rest, half = digits[-1], digits[:-1], 1 << len(digits) - 1
+    upper = _spelt(rest, max(low - half, 0), high - half)
+    lower = _spelt(rest, low, min(high, half - 1))
+    if upper == lower:
+        return upper
+    return disjunction(
+        [
+            conjunction([Is(first, Truth.TRUE), upper]),
+            conjunction([Is(first, Truth.FALSE), lower]),
+        ]
+    )
+
+
+def number_in(digits: Sequence[int], state: Sequence[int] | Mapping[int, int]) -> int:
+    """What the digits of a number say in a state."""
+    return sum((state[digit] >> 1) << place for place, digit in enumerate(digits))
 
 
 def conjunction(parts: Iterable[Condition]) -> Condition:
@@ -125,6 +179,8 @@ def negation(part: Condition) -> Condition:
             return Is(variable, negate(value))
         case Known(variable):
             return Is(variable, Truth.UNKNOWN)
+        case Within(digits, low, high):
+            return disjunction([within(digits, 0, low - 1), within(digits, high + 1, part.most)])
         case And(parts):
             return disjunction(map(negation, parts))
         case Or(parts):
@@ -156,7 +212,7 @@ def doubt(condition: Condition, leaf: Callable[[int], Condition]) -> Condition:
             return conjunction([some, *(not_false(negation(part)) for part in parts)])
         case Not(part):
             return doubt(negation(part), leaf)
-        case Is() | Known() | Constant():  # never unknown
+        case Is() | Known() | Within() | Constant():  # never unknown
             return FALSE
         case _:
             assert_never(condition)
@@ -170,16 +226,35 @@ def conjuncts(condition: Condition) -> tuple[Condition, ...]:
 
 
 def leaves(condition: Condition) -> Iterator[Is | Known]:
-    """What a condition reads, repeats included, from left to right."""
+    """What a condition reads, repeats included, from left to right; of a number, its digits."""
     match condition:
         case Is() | Known():
             yield condition
+        case Within(digits):
+            for digit in digits:
+                yield Is(digit, Truth.TRUE)
         case And(parts) | Or(parts):
             for part in parts:
                 yield from leaves(part)
         case Not(part):
             yield from leaves(part)
         case Constant():
+            return
+        case _:
+            assert_never(condition)
+
+
+def numbers_read(condition: Condition) -> Iterator[Within]:
+    """The tests of numbers in a condition, repeats included, from left to right."""
+    match condition:
+        case Within():
+            yield condition
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from numbers_read(part)
+        case Not(part):
+            yield from numbers_read(part)
+        case Is() | Known() | Constant():
             return
         case _:
             assert_never(condition)
@@ -195,17 +270,24 @@ def is_test(leaf: Is | Known) -> bool:
     return isinstance(leaf, Known) or leaf.value is Truth.UNKNOWN
 
 
-def replaced(condition: Condition, leaf: Callable[[Is | Known], Condition]) -> Condition:
-    """The condition in negation normal form, without constants and repeats, with other leaves."""
+def replaced(
+    condition: Condition,
+    leaf: Callable[[Is | Known], Condition],
+    numbers: Callable[[Within], Condition] | None = None,
+) -> Condition:
+    """The condition in negation normal form, without constants and repeats, with other leaves. Where nothing
+    is said of ``numbers``, their digits are leaves."""
     match condition:
         case Is() | Known():
             return leaf(condition)
+        case Within():
+            return replaced(in_digits(condition), leaf) if numbers is None else numbers(condition)
         case And(parts):
-            return conjunction(replaced(part, leaf) for part in parts)
+            return conjunction(replaced(part, leaf, numbers) for part in parts)
         case Or(parts):
-            return disjunction(replaced(part, leaf) for part in parts)
+            return disjunction(replaced(part, leaf, numbers) for part in parts)
         case Not(part):
-            return replaced(negation(part), leaf)
+            return replaced(negation(part), leaf, numbers)
         case Constant():
             return condition
         case _:
@@ -223,6 +305,8 @@ def evaluate(condition: Condition, state: Sequence[int]) -> Truth:
             return Truth.of(state[variable] == 1)
         case Known(variable):
             return Truth.of(state[variable] != 1)
+        case Within(digits, low, high):
+            return Truth.of(low <= number_in(digits, state) <= high)
         case And(parts):
             return min((evaluate(p, state) for p in parts), default=Truth.TRUE)
         case Or(parts):
@@ -274,6 +358,8 @@ def compile_condition(condition: Condition) -> Callable[[Sequence[int]], int]:
             return lambda state: 2 if state[variable] == 1 else 0
         case Known(variable):
             return lambda state: 0 if state[variable] == 1 else 2
+        case Within(digits, low, high):
+            return lambda state: 2 if low <= number_in(digits, state) <= high else 0
         case And(parts):
             return _least([compile_condition(p) for p in parts])
         case Or(parts):

@@ -8,7 +8,7 @@ from functools import reduce
 from typing_extensions import assert_never
 
 from bbtc.diagrams import ONE, ZERO, Diagrams, Weighted
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
 from bbtc.ground.task import Component
 from bbtc.kleene import Truth
 
@@ -41,6 +41,8 @@ class ConditionDiagrams:
                 return diagrams.cube([(place, value is Truth.TRUE)])
             case Known():
                 return ONE  # what is true of a world is no secret there
+            case Within():
+                return self.node(in_digits(condition))
             case Not(part):
                 return diagrams.complement(self.node(part))
             case And(parts):

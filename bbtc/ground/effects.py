@@ -27,17 +27,28 @@ from typing_extensions import assert_never
 from bbtc import durations
 from bbtc.diagnostics import Report
 from bbtc.durations import Duration, Empirical
-from bbtc.ground.condition import FALSE, TRUE, Condition
-from bbtc.ground.lower import Env, Frame, Lowered, Lowering, conjoin, projection
+from bbtc.ground.condition import TRUE, Condition, conjunction
+from bbtc.ground.loops import Loop
+from bbtc.ground.lower import Env, Frame, Lowering, conjoin, projection
 from bbtc.ground.normal import Block, Chance, groups, reads
-from bbtc.ground.reachability.atoms import Atoms, Scope
+from bbtc.ground.numbers.changes import Changes, Changing
+from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.reachability.bulk import Shared
 from bbtc.ground.settings import Numbers, Settings, certain, drawn
-from bbtc.ground.task import ONE, ZERO, Charge, Effect, Factor, Outcome, merge_outcomes, outcomes_of
+from bbtc.ground.task import (
+    ONE,
+    ZERO,
+    Charge,
+    Effect,
+    Factor,
+    NumberChange,
+    Outcome,
+    merge_outcomes,
+    outcomes_of,
+)
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 from bbtc.model import effect as me
-from bbtc.model import formula as mf
 from bbtc.model.types import Parameter
 from bbtc.rounding import too_long
 from bbtc.source import Span
@@ -53,10 +64,11 @@ class _Part:
     reward: Fraction = ZERO
     charges: dict[Condition, tuple[Fraction, Fraction]] = field(default_factory=dict)
     factors: list[Factor] = field(default_factory=list)
+    changes: list[NumberChange] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         """Does anything happen, further draws aside?"""
-        return bool(self.sets or self.cost or self.reward or self.charges)
+        return bool(self.sets or self.cost or self.reward or self.charges or self.changes)
 
     def add(self, guard: Condition, cost: Fraction, reward: Fraction) -> None:
         """Add to cost and reward where the guard is true."""
@@ -79,7 +91,8 @@ class _Part:
     def outcome(self, probability: Fraction, factors: tuple[Factor, ...]) -> Outcome:
         """All of it as one outcome, with further draws."""
         charges = tuple(Charge(guard, cost, reward) for guard, (cost, reward) in self.charges.items())
-        return Outcome(probability, self.effects(), factors, self.reward, self.cost, charges)
+        changes = tuple(self.changes)
+        return Outcome(probability, self.effects(), factors, self.reward, self.cost, charges, changes=changes)
 
     def effects(self) -> tuple[Effect, ...]:
         """The settings as effects, unconditional ones first, in order of variables."""
@@ -87,77 +100,6 @@ class _Part:
         return tuple(
             Effect(None if guard is TRUE else guard, tuple(sorted(sets.items()))) for guard, sets in ordered
         )
-
-
-# --- quantifiers with guards -------------------------------------------------------------------
-
-
-class _Loop:
-    """The bindings of some parameters under which a guard may be true. Each part of the guard is
-    looked at as soon as what it reads is bound."""
-
-    def __init__(
-        self,
-        lowering: Lowering,
-        frame: Frame,
-        parameters: tuple[Parameter, ...],
-        guard: tuple[mf.Formula, ...],
-    ) -> None:
-        self._spend = lowering.spend
-        pending = list(guard)
-        later = {parameter.name for parameter in parameters}
-        self._first = self._lower(lowering, frame, _ready(pending, later))
-        self._levels: list[tuple[int, Callable[[Env], Sequence[int]], list[Lowered]]] = []
-        for parameter in parameters:
-            later.discard(parameter.name)
-            slot, parts = frame.slot(parameter.name), _ready(pending, later)
-            members = lowering.members(parameter, parts, frame)
-            self._levels.append((slot, members, self._lower(lowering, frame, parts)))
-        self.trivial = not self._levels and not self._first
-
-    @staticmethod
-    def _lower(lowering: Lowering, frame: Frame, parts: list[mf.Formula]) -> list[Lowered]:
-        return [lowering.normal(part, frame, Scope.TRUTH) for part in parts]
-
-    def guards(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
-        """For each binding, which is then in ``env``: the guard's conditions (no constants),
-        together with those above."""
-        conditions = _met(self._first, env, above)
-        if conditions is not None:
-            yield from self._enter(0, env, conditions)
-
-    def _enter(self, level: int, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
-        if level == len(self._levels):
-            yield above
-            return
-        slot, members_of, parts = self._levels[level]
-        members = members_of(env)
-        self._spend(len(members))
-        for env[slot] in members:  # 1
-            conditions = _met(parts, env, above)
-            if conditions is not None:
-                yield from self._enter(level + 1, env, conditions)
-
-
-def _ready(pending: list[mf.Formula], later: set[str]) -> list[mf.Formula]:
-    """The parts that can be looked at before what comes later is bound; they are pending no more."""
-    ready = [part for part in pending if later.isdisjoint(mf.free(part))]
-    pending[:] = [part for part in pending if not later.isdisjoint(mf.free(part))]
-    return ready
-
-
-def _met(parts: list[Lowered], env: Env, above: list[Condition]) -> list[Condition] | None:
-    """The conditions of the parts after those above; None if one is false."""
-    if not parts:
-        return above
-    found = list(above)
-    for part in parts:
-        condition = part(env)
-        if condition is FALSE:  # 2
-            return None
-        if condition is not TRUE:
-            found.append(condition)
-    return found
 
 
 # --- compiled effects ----------------------------------------------------------------------------
@@ -170,6 +112,7 @@ class EffectLowering:
         self.lowering = lowering
         self.atoms: Atoms = lowering.atoms
         self.report = report
+        self.changes = Changes(lowering.amounts, report)
 
     def reached(
         self, block: Block, parameters: tuple[Parameter, ...], span: Span | None
@@ -199,11 +142,11 @@ class LoweredEffect:
         self._span = span
         self._frame = frame
         self._costs: list[_Addition] = []
-        self._groups: list[tuple[_Loop, list[_Leaf]]] = []
+        self._groups: list[tuple[Loop, list[_Leaf]]] = []
         lowering = owner.lowering
         always: list[me.Set] = []
         for group in groups(block):
-            loop = _Loop(lowering, frame, group.parameters, group.guard)
+            loop = Loop(lowering, frame, group.parameters, group.guard)
             leaves: list[_Leaf] = []
             for leaf in group.leaves:
                 match leaf:
@@ -211,10 +154,12 @@ class LoweredEffect:
                         always.append(leaf)
                     case me.Set(predicate, args, value):
                         leaves.append(_Setting(lowering.number(predicate, args, frame), value))
-                    case me.Add(to="cost") if loop.trivial:
+                    case me.Add(to="cost") if loop.trivial and not owner.changes.depends(leaf.amount):
                         self._costs.append(_Addition(owner, leaf, frame))
                     case me.Add():
                         leaves.append(_Addition(owner, leaf, frame))
+                    case me.Change():
+                        leaves.append(Changing(owner.changes, leaf, frame.rows))
                     case _:
                         assert_never(leaf)
             if leaves:
@@ -254,7 +199,7 @@ class LoweredEffect:
         """
         part = self.part(env, [])
         cost, part.cost = part.cost, ZERO
-        factors = _arranged(part)
+        factors = self._owner.changes.settled(_arranged(part), self._span)
         for outcome in outcomes_of(factors):
             charged = (number for charge in outcome.charges for number in (charge.cost, charge.reward))
             for number in (outcome.probability, outcome.cost, outcome.reward, *charged):
@@ -287,9 +232,13 @@ class LoweredEffect:
         for always in self._always.numbers(env):
             yield always, above
         for loop, leaves in self._groups:
-            setters = [leaf for leaf in leaves if isinstance(leaf, _Setting)]
+            setters = [leaf for leaf in leaves if isinstance(leaf, _Setting | Changing)]
             for conditions in loop.guards(env, above):
                 for leaf in setters:
+                    if isinstance(leaf, Changing):
+                        more = [*conditions, *leaf.read(env)]
+                        yield from ((digit, more) for digit in leaf.digits(env))
+                        continue
                     number = leaf.number(env)
                     if number is not None:
                         yield number, conditions
@@ -297,12 +246,25 @@ class LoweredEffect:
             yield from chance.settings(env, above)
 
     def charged(self, env: Env, above: list[Condition]) -> Iterator[list[Condition]]:
-        """The conditions under which something is added to cost or reward."""
+        """The conditions under which something is added to cost or reward, or that keep the action from
+        starting since a number would leave its range."""
         if self._costs and above:
             yield above
         for loop, leaves in self._groups:
-            if any(isinstance(leaf, _Addition) for leaf in leaves):
-                yield from loop.guards(env, above)
+            if any(isinstance(leaf, _Addition | Changing) for leaf in leaves):
+                for conditions in loop.guards(env, above):
+                    read = [
+                        part
+                        for leaf in leaves
+                        for part in (
+                            leaf.read(env, blocking=True)
+                            if isinstance(leaf, Changing)
+                            else leaf.read(env)
+                            if isinstance(leaf, _Addition)
+                            else ()
+                        )
+                    ]
+                    yield [*conditions, *read]
         for chance in self._chances:
             yield from chance.charged(env, above)
 
@@ -318,7 +280,10 @@ class LoweredEffect:
             for conditions in loop.guards(env, above):
                 guard = conjoin(conditions)
                 for leaf in leaves:
-                    leaf.run(part, env, guard)
+                    if isinstance(leaf, Changing):
+                        part.changes += leaf.made(env, guard)
+                    else:
+                        leaf.run(part, env, guard)
         for chance in self._chances:
             part.draw(chance.factors(env, above))
         return part
@@ -349,29 +314,43 @@ class _Addition:
     def __init__(self, owner: EffectLowering, leaf: me.Add, frame: Frame) -> None:
         self._owner = owner
         self._leaf = leaf
-        self._value = _Amounts(owner, frame).lower(leaf.amount)
+        self._depends = owner.changes.depends(leaf.amount)
+        self._value = None if self._depends else _Amounts(owner, frame).lower(leaf.amount)
+        self._cases = owner.changes.cases(leaf.amount, frame.rows, leaf.span) if self._depends else None
 
     def amount(self, env: Env) -> Fraction:
-        """What is added, with its sign."""
+        """What is added, with its sign; for one that depends on no number of the state."""
+        assert self._value is not None
         value = self._value(env)
         return value if self._leaf.sign == 1 else self._leaf.sign * value
 
+    def read(self, env: Env) -> Iterator[Condition]:
+        """Conditions that read all numbers which the amount depends on."""
+        return iter(()) if self._cases is None else (condition for condition, _ in self._cases(env))
+
     def run(self, part: _Part, env: Env, guard: Condition) -> None:
         """Count it where the guard is true."""
-        leaf, amount = self._leaf, self._owner.short(self.amount(env), self._leaf.span)
+        if self._cases is None:
+            self._count(part, guard, self.amount(env))
+            return
+        for condition, value in self._cases(env):
+            self._count(part, conjunction([guard, condition]), self._leaf.sign * value)
+
+    def _count(self, part: _Part, guard: Condition, value: Fraction) -> None:
+        leaf, amount = self._leaf, self._owner.short(value, self._leaf.span)
         part.add(guard, *((amount, ZERO) if leaf.to == "cost" else (ZERO, amount)))
         for total in (part.cost, part.reward, *part.charges.get(guard, ())):
             self._owner.short(total, leaf.span)
 
 
-_Leaf = _Setting | _Addition
+_Leaf = _Setting | _Addition | Changing
 
 
 class _LoweredChance:
     """A compiled chance."""
 
     def __init__(self, owner: EffectLowering, chance: Chance, frame: Frame) -> None:
-        self._loop = _Loop(owner.lowering, frame, chance.parameters, chance.guard)
+        self._loop = Loop(owner.lowering, frame, chance.parameters, chance.guard)
         self._branches = [(p, LoweredEffect(owner, block, frame)) for p, block in chance.branches]
         self._oneof = chance.oneof
         self._timeout = None if chance.timeout is None else LoweredTimeOut(owner, chance.timeout, frame)
@@ -481,6 +460,9 @@ class _Amounts:
     def _value(self, amount: me.FunctionValue) -> Callable[[Env], Fraction]:
         universe, numbers = self._owner.atoms.universe, self._owner.atoms.model.init.numbers
         rows = self._frame.rows(amount.args)
+        if self._owner.changes.depends(amount):
+            message = f"`{amount.function}` changes, and what is worked out here may not"
+            self._owner.report.error("BBT0440", message, amount.span)
 
         def value(env: Env) -> Fraction:
             args = universe.args(rows(env))
@@ -530,12 +512,13 @@ def _absorb(part: _Part, outcome: Outcome) -> None:
     for charge in outcome.charges:
         part.add(charge.when, charge.cost, charge.reward)
     part.factors.extend(outcome.factors)
+    part.changes.extend(outcome.changes)
 
 
 def _join(part: _Part, outcome: Outcome) -> Outcome:
     """The outcome with everything that is certain beside it (rule 8)."""
     sets = {guard: dict(sets) for guard, sets in part.sets.items()}
-    both = _Part(sets, part.cost, part.reward, dict(part.charges))
+    both = _Part(sets, part.cost, part.reward, dict(part.charges), changes=list(part.changes))
     _absorb(both, outcome)
     return replace(both.outcome(outcome.probability, tuple(both.factors)), timed_out=outcome.timed_out)
 

@@ -17,11 +17,13 @@ from bbtc.ground.condition import (
     Known,
     Not,
     Or,
+    Within,
     conjunction,
+    in_digits,
     replaced,
     variables,
 )
-from bbtc.ground.task import GroundEvent, Variable, outcomes_of
+from bbtc.ground.task import GroundEvent, Variable, ground_name, outcomes_of
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 
@@ -40,16 +42,23 @@ def clashes(
     for (_, variable), found in setters.items():
         for (one, first, when), (other, second, then) in combinations(found, 2):
             fact = task_variables[variable]
-            key = (one.schema, other.schema, fact.predicate)
-            if one is other or first is second or key in told:
+            called = fact.name if fact.digit is None else ground_name(fact.digit.function, fact.args)
+            key = (one.schema, other.schema, called.partition("(")[0])
+            # Two changes of a number do not add up, even where they agree on a digit.
+            agree = first is second and fact.digit is None
+            if one is other or agree or key in told:
                 continue
             limits.check_time("grounding")
             if _may_be_true(conjunction([when, then]), task_variables):
                 told.add(key)
                 yield Diagnostic(
                     "BBT0451",
-                    f"events `{one.name}` and `{other.name}` may happen at once, and set {fact.name} to "
-                    f"{first.word} and {second.word}",
+                    f"events `{one.name}` and `{other.name}` may happen at once, and "
+                    + (
+                        f"set {fact.name} to {first.word} and {second.word}"
+                        if fact.digit is None
+                        else f"both change {called}"
+                    ),
                     other.span,
                     f"say which happens first: `:before {other.schema}` in `{one.schema}`, or the other way "
                     "round; or let their preconditions exclude each other",
@@ -89,6 +98,8 @@ def _can_be_true(condition: Condition, state: Mapping[int, Truth]) -> bool:
             return state.get(variable, value) is value
         case Known(variable):
             return state.get(variable) is not Truth.UNKNOWN
+        case Within():
+            return _can_be_true(in_digits(condition), state)
         case And(parts):
             return all(_can_be_true(part, state) for part in parts)
         case Or(parts):

@@ -10,6 +10,7 @@ from bbtc.diagnostics import Diagnostic, Related, Report
 from bbtc.ground.lower import Lowering
 from bbtc.ground.missing import Fact, Lack, Missing, NoneTogether, NoObject, Search
 from bbtc.ground.normal import conjuncts
+from bbtc.ground.numbers.digits import with_digits
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.reachability.reach import Reach, reach
 from bbtc.ground.refused import refused
@@ -49,7 +50,8 @@ def goal_doubts(model: md.Model, limits: Limits) -> list[Diagnostic] | None:
     `:init` may have forgotten to call unknown. None for what cannot be grounded anyway. Raises
     :class:`bbtc.diagnostics.LimitReached`."""
     begun = Report()
-    if model.goal is None or any(True for _ in refused(model)):
+    model = with_digits(model, begun)
+    if model.goal is None or begun.errors or any(True for _ in refused(model)):
         return None
     begin = beginning(model, begun, limits)
     if begun.errors:

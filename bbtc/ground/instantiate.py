@@ -6,6 +6,7 @@ from bbtc.collector import collector_paused
 from bbtc.diagnostics import Report
 from bbtc.ground import task as gt
 from bbtc.ground.hidden.compile import hidden_task
+from bbtc.ground.numbers.digits import with_digits
 from bbtc.ground.pruning.prune import prune
 from bbtc.ground.pruning.relevance import Relevance
 from bbtc.ground.reachability.atoms import Atoms
@@ -22,6 +23,8 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     be grounded or its goal is unreachable even if nothing were ever undone, and
     :class:`bbtc.diagnostics.LimitReached` at a limit.
     """
+    model = with_digits(model, report)
+    report.raise_errors()
     if has_hidden_state(model):
         return hidden_task(model, report, limits)
     if model.templates:
@@ -41,6 +44,8 @@ def ground(model: md.Model, report: Report, limits: Limits) -> gt.Task:
 def instantiate(model: md.Model, report: Report, limits: Limits) -> gt.Task:
     """:func:`ground` without leaving out what cannot matter to the goal: every action that can apply
     and do something, or that a template calls."""
+    model = with_digits(model, report)
+    report.raise_errors()
     with collector_paused():
         begin, reached = reached_from(model, report, limits)
         builder = TaskBuilder(Atoms(reached), report, begin, limits)

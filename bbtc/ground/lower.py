@@ -9,7 +9,7 @@ from typing import Any
 
 from typing_extensions import assert_never
 
-from bbtc.diagnostics import BbtcError
+from bbtc.diagnostics import BbtcError, Report
 from bbtc.ground.condition import (
     FALSE,
     TRUE,
@@ -24,6 +24,7 @@ from bbtc.ground.condition import (
     negation,
 )
 from bbtc.ground.normal import conjuncts, disjuncts, normal_form
+from bbtc.ground.numbers.amounts import Amounts
 from bbtc.ground.reachability.atoms import Atoms, Leaves, OpenLeaves, Scope
 from bbtc.ground.reachability.bulk import Shared, instances, picker
 from bbtc.ground.universe import Row, Universe
@@ -102,9 +103,10 @@ def projection(
 class Lowering:
     """Compiles the conditions of one model."""
 
-    def __init__(self, atoms: Atoms, limits: Limits) -> None:
+    def __init__(self, atoms: Atoms, limits: Limits, report: Report | None = None) -> None:
         self.atoms = atoms
         self.universe = atoms.universe
+        self.amounts = Amounts(atoms, report or Report())
         self._limits = limits
         self._bindings = self._unlooked = 0
         model = _Derived(self, Scope.MODEL)
@@ -172,6 +174,8 @@ class Lowering:
                 return _equal(frame.slot(left), frame.slot(right), TRUE, FALSE)
             case mf.Not(mf.Equal(left, right)):
                 return _equal(frame.slot(left), frame.slot(right), FALSE, TRUE)
+            case mf.Compare():
+                return self.amounts.compare(formula, frame.rows)
             case mf.And():
                 parts = sorted(conjuncts(formula), key=self._late)
                 return _all([self.normal(part, frame, scope) for part in parts])

@@ -116,6 +116,8 @@ class Search:
                 return None if self._may_equal(left, right, env, same=True) else Some(())
             case mf.Not(mf.Equal(left, right)):
                 return None if self._may_equal(left, right, env, same=False) else Some(())
+            case mf.Compare():
+                return None  # what numbers can be is not traced
             case mf.And(parts):
                 return every(self._need(part, env) for part in parts)
             case mf.Or(parts):

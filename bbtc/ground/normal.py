@@ -20,12 +20,13 @@ distributive lattice where negation reverses the order:
 10. ``(not (unknown p))`` → ``(known p)``; so with ``known`` and ``unknown`` exchanged
 11. ``(forall (?x ?y) f)`` → ``(forall (?x) (forall (?y) f))``; so with ``exists``
 12. ``(exists (?x) (and f (g ?x)))`` → ``(and f (exists (?x) (g ?x)))``; so with ``forall`` and ``or``
+13. ``(not (< a b))`` → ``(>= a b)``; so with the other comparisons
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal
 
@@ -33,6 +34,7 @@ from typing_extensions import assert_never
 
 from bbtc.model import effect as me
 from bbtc.model import formula as mf
+from bbtc.model.amount import functions
 from bbtc.model.types import Parameter
 
 # --- effects ---------------------------------------------------------------------------------
@@ -44,7 +46,7 @@ class Item:
 
     parameters: tuple[Parameter, ...]
     guard: tuple[mf.Formula, ...]
-    leaf: me.Set | me.Add
+    leaf: me.Leaf
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ def _walk(
     chances: list[Chance],
 ) -> None:
     match effect:
-        case me.Set() | me.Add():
+        case me.Set() | me.Add() | me.Change():
             items.append(Item(parameters, guard, effect))
         case me.Together(parts):  # 1
             for part in parts:
@@ -114,17 +116,17 @@ class Group:
 
     parameters: tuple[Parameter, ...]
     guard: tuple[mf.Formula, ...]
-    leaves: tuple[me.Set | me.Add, ...]
+    leaves: tuple[me.Leaf, ...]
 
     @property
     def sets(self) -> list[me.Set]:
-        """The leaves that set an atom."""
-        return [leaf for leaf in self.leaves if isinstance(leaf, me.Set)]
+        """What the leaves may set."""
+        return [each for leaf in self.leaves for each in me.sets_of(leaf)]
 
 
 def groups(block: Block) -> Iterator[Group]:
     """The items of a block by parameters and guard, in order of appearance."""
-    found: dict[tuple[tuple[Parameter, ...], tuple[mf.Formula, ...]], list[me.Set | me.Add]] = {}
+    found: dict[tuple[tuple[Parameter, ...], tuple[mf.Formula, ...]], list[me.Leaf]] = {}
     for item in block.items:
         found.setdefault((item.parameters, item.guard), []).append(item.leaf)
     return (Group(parameters, guard, tuple(leaves)) for (parameters, guard), leaves in found.items())
@@ -139,6 +141,9 @@ def reads(block: Block) -> Iterator[str]:
             case me.Set(_, args):
                 yield from args
             case me.Add(amount=amount):
+                yield from _terms(amount)
+            case me.Change(args=args, amount=amount):
+                yield from args
                 yield from _terms(amount)
             case _:
                 assert_never(item.leaf)
@@ -159,16 +164,7 @@ def timing_terms(duration: me.LiftedDuration | None, timeout: me.TimeOut | None)
 
 
 def _terms(amount: me.Amount) -> Iterator[str]:
-    match amount:
-        case me.Constant():
-            return
-        case me.FunctionValue(_, args):
-            yield from args
-        case me.Arithmetic(_, operands):
-            for operand in operands:
-                yield from _terms(operand)
-        case _:
-            assert_never(amount)
+    return (arg for value in functions(amount) for arg in value.args)
 
 
 # --- conditions ------------------------------------------------------------------------------
@@ -182,6 +178,8 @@ def normal_form(formula: mf.Formula, negative: bool = False) -> mf.Formula:
         case mf.Test(kind, atom, span):
             other: Literal["unknown", "known"] = "known" if kind == "unknown" else "unknown"
             return mf.Test(other, atom, span) if negative else formula  # 10
+        case mf.Compare(operator):
+            return replace(formula, operator=mf.OPPOSITE[operator]) if negative else formula  # 13
         case mf.Not(part):  # 7
             return normal_form(part, not negative)
         case mf.And(parts, span) | mf.Or(parts, span):  # 8

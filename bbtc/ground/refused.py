@@ -84,10 +84,7 @@ def _refused_events(model: md.Model) -> Iterator[Diagnostic]:
     hides = has_hidden_state(model)
     for schema in model.schemas.values():
         event = schema.exogenous
-        if event is not None and event.per == "second":
-            message = f"event `{schema.name}` is drawn by time, which actions do not take yet"
-            yield Diagnostic("BBT0452", message, schema.span, "draw it once an action: `:per action`")
-        elif hides and (event is not None or schema.during is not None):
+        if hides and (event is not None or schema.during is not None):
             what = f"event `{schema.name}`" if event is not None else f"`:while` of action `{schema.name}`"
             message = f"{what} cannot be grounded beside hidden state"
             hint = "hidden is what `:observe` tells, and what `:init` leaves open beside it; without these, "

@@ -132,5 +132,9 @@ def _factors(branches: list[tuple[Fraction, list[Pairs]]], *, oneof: bool) -> li
         effects: list[tuple[Effect, ...]] = list(zip(instances(Effect, size, repeat(None), sets)))
         if not all(sets):
             effects = [made if each else () for made, each in zip(effects, sets, strict=True)]
-        outcomes.append(instances(Outcome, size, repeat(probability), effects, none, zeros, zeros, none))
+        outcomes.append(
+            instances(
+                Outcome, size, repeat(probability), effects, none, zeros, zeros, none, repeat(False), none
+            )
+        )
     return list(zip(instances(Factor, size, zip(*outcomes, strict=True), repeat(oneof))))

@@ -237,7 +237,7 @@ def _spelled(model: md.Model, formula: mf.Formula, limits: Limits) -> mf.Formula
                 every.append(_spelled(model, mf.substitute(part, {**binding}), limits))
                 limits.check_bindings(len(every))
             return mf.And(tuple(every), span) if kind == "forall" else mf.Or(tuple(every), span)
-        case mf.Atom() | mf.Test() | mf.Equal():
+        case mf.Atom() | mf.Test() | mf.Equal() | mf.Compare():
             return formula
         case _:
             assert_never(formula)
@@ -266,7 +266,7 @@ def _draw(
         case me.Set(predicate, args, value):
             atom = (predicate, tuple(binding[arg] if is_parameter(arg) else arg for arg in args))
             return [(Fraction(1), {atom: value})]
-        case me.Add():
+        case me.Add() | me.Change():
             return [(Fraction(1), {})]
         case me.When(_, inner):
             return _draw(model, inner, binding, limits)

@@ -6,60 +6,25 @@ and costs are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Literal, TypeAlias
 
 from bbtc.diagrams import Diagram
-from bbtc.durations import Duration
+from bbtc.durations import INSTANT, Duration, meanwhile
 from bbtc.ground.condition import Condition
+from bbtc.ground.variables import Digit as Digit
+from bbtc.ground.variables import NumberVariable as NumberVariable
+from bbtc.ground.variables import Variable as Variable
+from bbtc.ground.variables import digit_name as digit_name
+from bbtc.ground.variables import ground_name as ground_name
+from bbtc.ground.variables import numbers_of as numbers_of
+from bbtc.ground.variables import split_name as split_name
+from bbtc.ground.variables import unused_name as unused_name
 from bbtc.kleene import Truth
 from bbtc.source import Span
-
-
-def ground_name(symbol: str, args: tuple[str, ...]) -> str:
-    """``symbol(arg,…)``: the name of a ground predicate, action or template."""
-    return f"{symbol}({','.join(args)})"
-
-
-def split_name(name: str) -> tuple[str, tuple[str, ...]]:
-    """Symbol and arguments of a ground name, as far as the name alone tells: what it says of one
-    that :func:`ground_name` made of words with commas or brackets in them need not be right."""
-    symbol, _, rest = name.partition("(")
-    inner = rest.removesuffix(")")
-    return symbol, tuple(inner.split(",")) if inner else ()
-
-
-def unused_name(name: str, taken: Collection[str]) -> str:
-    """The name, made longer if it is taken."""
-    while name in taken:
-        name += "-"
-    return name
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """One ground predicate. ``three_valued`` if anything in the task can make it unknown; ``external`` if
-    others change it, of whom the task knows nothing."""
-
-    predicate: str
-    args: tuple[str, ...]
-    three_valued: bool
-    hidden: bool = False
-    span: Span | None = field(default=None, compare=False, repr=False)
-    external: bool = False
-
-    @property
-    def name(self) -> str:
-        """``predicate(arg,…)``."""
-        return ground_name(self.predicate, self.args)
-
-    @property
-    def values(self) -> tuple[Truth, ...]:
-        """The values it can take."""
-        return (Truth.TRUE, Truth.FALSE, Truth.UNKNOWN) if self.three_valued else (Truth.TRUE, Truth.FALSE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,12 +45,33 @@ class Charge:
 
 
 @dataclass(frozen=True, slots=True)
+class Case:
+    """What a number becomes where ``when`` is true before the action (None: always): the ``amount``, counted
+    from the number's least value, or that much more than it was, no further than to its bounds."""
+
+    when: Condition | None
+    kind: Literal["assign", "add"]
+    amount: int
+
+
+@dataclass(frozen=True, slots=True)
+class NumberChange:
+    """What happens to the number with these digits: at most one of the cases is so."""
+
+    digits: tuple[int, ...]
+    cases: tuple[Case, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """One thing that may happen, with its probability within its factor.
 
     ``factors`` are further independent choices made if this outcome happens (chance nested in
     a branch). ``reward`` is what the outcome adds to the reward fluent, ``cost`` what it adds to the
     action's cost; ``charges`` add to both under conditions.
+
+    ``changes`` tell what happens to numbers, each of which has at most one in what happens at once. The
+    effects do the same to their digits: whoever reads changes leaves out what effects set of digits.
     """
 
     probability: Fraction
@@ -96,6 +82,12 @@ class Outcome:
     charges: tuple[Charge, ...] = ()
     timed_out: bool = False
     """The action is given up, since its time-out passes; what else may happen stands in other outcomes."""
+    changes: tuple[NumberChange, ...] = ()
+
+    @property
+    def does_something(self) -> bool:
+        """Does it set or add anything, or draw further?"""
+        return bool(self.effects or self.factors or self.reward or self.cost or self.charges)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +211,8 @@ class GroundAction:
     factors: tuple[Factor, ...]
     cost: Fraction = Fraction(1)
     changes: tuple[Change, ...] = ()
+    uninterruptible: bool = False
+    """While it runs on a robot, nothing preempts it; figures do not ask."""
     span: Span | None = field(default=None, compare=False, repr=False)
     during: Condition | None = None
     on_abort: tuple[Factor, ...] = ()
@@ -238,7 +232,9 @@ class GroundAction:
 
 @dataclass(frozen=True, slots=True)
 class GroundEvent:
-    """What happens by itself, once an action: where the precondition is true, one outcome of every factor.
+    """What happens by itself, once an action: where the precondition is true, one outcome of every factor. By
+    the ``rate`` of a second, each factor draws the one outcome that does something, at most once, with its
+    probability for every second that the action takes (:func:`bbtc.durations.meanwhile`).
 
     The events of one ``round`` happen at once: all read the state that the action left, or the round before,
     and no two of them set a variable to different values."""
@@ -249,11 +245,18 @@ class GroundEvent:
     factors: tuple[Factor, ...]
     round: int = 0
     span: Span | None = field(default=None, compare=False, repr=False)
+    rate: Literal["action", "second"] = "action"
 
     @property
     def name(self) -> str:
         """``schema(arg,…)``."""
         return ground_name(self.schema, self.args)
+
+    def during(self, action: GroundAction) -> GroundEvent:
+        """The event as it happens with an action."""
+        if self.rate == "action":
+            return self
+        return replace(self, factors=tuple(_over_time(each, action) for each in self.factors), rate="action")
 
     @property
     def possible_factors(self) -> tuple[Factor, ...]:
@@ -323,7 +326,7 @@ class Signature:
     """The parameter names of a predicate or an action schema, as declared, without ``?``. They name
     the ports and arguments of exported leaves; where a task has none, exporters number them."""
 
-    kind: Literal["predicate", "action"]
+    kind: Literal["predicate", "action", "function"]
     symbol: str
     parameters: tuple[str, ...]
 
@@ -382,6 +385,21 @@ class Task:
         return {variable.name: index for index, variable in enumerate(self.variables)}
 
     @cached_property
+    def numbers(self) -> tuple[NumberVariable, ...]:
+        """The numbers, in the order of their first digits."""
+        return numbers_of(self.variables)
+
+    @cached_property
+    def number_by_name(self) -> dict[str, NumberVariable]:
+        """Each number by its name."""
+        return {number.name: number for number in self.numbers}
+
+    @cached_property
+    def number_of_digit(self) -> dict[int, NumberVariable]:
+        """By variable that is a digit: its number."""
+        return {digit: number for number in self.numbers for digit in number.digits}
+
+    @cached_property
     def action_by_name(self) -> dict[str, GroundAction]:
         """Each action by its ground name."""
         return {action.name: action for action in self.actions}
@@ -392,12 +410,22 @@ class Task:
         return (*self.actions, *self.events)
 
     @cached_property
-    def rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
-        """The events by round, in order."""
+    def _rounds(self) -> tuple[tuple[GroundEvent, ...], ...]:
         found: dict[int, list[GroundEvent]] = {}
         for event in self.events:
             found.setdefault(event.round, []).append(event)
         return tuple(tuple(found[number]) for number in sorted(found))
+
+    @property
+    def moves_by_time(self) -> bool:
+        """Are there events that are the more probable, the longer an action takes?"""
+        return any(event.rate == "second" for event in self.events)
+
+    def rounds(self, action: GroundAction) -> tuple[tuple[GroundEvent, ...], ...]:
+        """The events that happen with an action by round, in order."""
+        if not self.moves_by_time:
+            return self._rounds
+        return tuple(tuple(event.during(action) for event in events) for events in self._rounds)
 
     @cached_property
     def endless_beliefs(self) -> bool:
@@ -426,6 +454,18 @@ ONE = Fraction(1)
 NO_CHANGE = Factor((Outcome(ONE, ()),))
 
 
+def _over_time(factor: Factor, action: GroundAction) -> Factor:
+    """A factor that is drawn every second until something happens, while an action goes on."""
+    happens = [each for each in factor.outcomes if each.does_something]
+    chance = sum((each.probability for each in happens), ZERO)
+    if not chance:
+        return factor
+    total = meanwhile(chance, INSTANT if action.duration is None else action.duration, action.timeout)
+    scaled = [replace(each, probability=each.probability * total / chance) for each in happens]
+    rest = () if total == 1 else (Outcome(1 - total, ()),)
+    return replace(factor, outcomes=(*(each for each in scaled if each.probability), *rest))
+
+
 def outcomes_of(factors: Iterable[Factor]) -> Iterator[Outcome]:
     """Every outcome of some factors, nested ones included, each before those nested in it."""
     for factor in factors:
@@ -440,7 +480,7 @@ def merge_outcomes(outcomes: Iterable[Outcome]) -> tuple[Outcome, ...]:
     for outcome in outcomes:
         key = (
             *(outcome.effects, outcome.factors, outcome.reward, outcome.cost, outcome.charges),
-            outcome.timed_out,
+            *(outcome.timed_out, outcome.changes),
         )
         before = merged.get(key)
         if before is not None:
@@ -486,6 +526,16 @@ def apparent_factors(task: Task, doing: GroundAction | GroundEvent | GroundTempl
         Factor(tuple(Outcome(third, (Effect(None, ((knowledge.variable, value),)),)) for value in Truth))
         for change in doing.changes
         for knowledge in task.components[change.component].known
+    )
+
+
+def may_set(task: Task, action: GroundAction) -> frozenset[int]:
+    """Every variable that an action may set while it runs, or make known: what it does to facts by itself
+    never preempts it (docs/multi-tick-actions.md)."""
+    return frozenset(
+        variable
+        for effect in effects_of((*apparent_factors(task, action), *action.on_abort))
+        for variable, _ in effect.sets
     )
 
 

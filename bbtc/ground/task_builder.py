@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from itertools import compress, repeat
@@ -10,8 +10,8 @@ from operator import itemgetter
 
 from typing_extensions import assert_never
 
-from bbtc.diagnostics import Report
-from bbtc.durations import Duration
+from bbtc.diagnostics import Diagnostic, Report
+from bbtc.durations import Duration, LogNormal
 from bbtc.ground import task as gt
 from bbtc.ground.condition import FALSE, Condition, conjunction, evaluate
 from bbtc.ground.effects import EffectLowering, LoweredDuration, LoweredEffect, LoweredTimeOut, arrange
@@ -19,12 +19,13 @@ from bbtc.ground.events import clashes
 from bbtc.ground.goal import unreachable
 from bbtc.ground.lower import Env, Frame, Lowered, Lowering, extend, projection
 from bbtc.ground.normal import conjuncts, normalise, timing_terms
+from bbtc.ground.numbers.digits import digits_of, is_digit
+from bbtc.ground.pruning.renumber import reordered
 from bbtc.ground.reachability.atoms import Atoms
 from bbtc.ground.reachability.bulk import Shared, consumed, instances
 from bbtc.ground.reachability.reach import Reach, reach
 from bbtc.ground.reachability.usage import called
 from bbtc.ground.refused import refused
-from bbtc.ground.renumber import reordered
 from bbtc.ground.start import Beginning, beginning
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
@@ -47,7 +48,7 @@ def reached_from(model: md.Model, report: Report, limits: Limits) -> tuple[Begin
 def goal_of(model: md.Model, atoms: Atoms, report: Report, limits: Limits) -> Condition:
     """The goal. Raises with an error for each part of it that nothing can ever make true."""
     assert model.goal is not None
-    lowering = Lowering(atoms, limits)
+    lowering = Lowering(atoms, limits, report)
     parts = []
     for part in conjuncts(model.goal):
         if lowering.is_never(part):
@@ -76,9 +77,14 @@ def _signatures(model: md.Model) -> tuple[gt.Signature, ...]:
     predicates = [
         gt.Signature("predicate", predicate.name, tuple(p.name[1:] for p in predicate.parameters))
         for predicate in model.predicates.values()
-        if predicate.name not in model.thresholds
+        if predicate.name not in model.thresholds and not is_digit(model, predicate.name)
     ]
-    return tuple(sorted([*actions, *predicates], key=lambda each: (each.kind, each.symbol)))
+    numbers = [
+        gt.Signature("function", function.name, tuple(p.name[1:] for p in function.parameters))
+        for function in model.functions.values()
+        if function.range is not None
+    ]
+    return tuple(sorted([*actions, *predicates, *numbers], key=lambda each: (each.kind, each.symbol)))
 
 
 class TaskBuilder:
@@ -93,7 +99,7 @@ class TaskBuilder:
         self.begin = begin
         self.universe = atoms.universe
         self.atoms = atoms
-        self.lowering = Lowering(atoms, limits)
+        self.lowering = Lowering(atoms, limits, report)
         self.effects = EffectLowering(self.lowering, report)
         self._made: set[str] = set()
         self._asked: dict[str, tuple[str, Row]] = {}
@@ -113,9 +119,9 @@ class TaskBuilder:
         events = self._events()
         templates = self._all_templates()
         # The last of them, since conditions ask for variables.
-        variables = self.atoms.variables()
+        variables = self.atoms.variables(digits_of(model))
         initial = self._initial(variables)
-        for finding in clashes(events, variables, limits):
+        for finding in (*clashes(events, variables, limits), *self._unknown_rates(events, actions)):
             report.add(finding)
         report.raise_errors()
         if all(evaluate(goal, state.values) is Truth.TRUE for state in initial):
@@ -170,6 +176,11 @@ class TaskBuilder:
             met = [condition is not FALSE for condition in found]
             chunk, found = list(compress(some, met)), list(compress(found, met))
             done = effects.all(chunk)
+            if self.effects.changes.blocking:
+                found = self.effects.changes.kept_within(found, [factors for factors, _ in done])
+                met = [condition is not FALSE for condition in found]
+                chunk, found = list(compress(chunk, met)), list(compress(found, met))
+                done = list(compress(done, met))
             if schema.during is not None and counts_cost:  # it costs nothing where it does not happen
                 done = [(self._with_cost(*each), Fraction(0)) for each in done]
             made += instances(
@@ -181,6 +192,7 @@ class TaskBuilder:
                 [factors or _NO_FACTORS for factors, _ in done],
                 map(itemgetter(1), done) if counts_cost else repeat(unit),
                 repeat(()),
+                repeat(schema.uninterruptible),
                 repeat(schema.span),
                 *self._interruptions(schema, chunk),
             )
@@ -230,6 +242,7 @@ class TaskBuilder:
     def _events(self) -> tuple[gt.GroundEvent, ...]:
         """Every event that can ever happen, by round and name."""
         rounds = md.rounds_of(self.model)
+        rates = {each.name: each.exogenous.per for each in self.model.events if each.exogenous is not None}
         found = [
             gt.GroundEvent(
                 each.schema,
@@ -238,11 +251,26 @@ class TaskBuilder:
                 self._with_cost(each.factors, each.cost if self.model.counts_cost else Fraction(0)),
                 rounds[name],
                 each.span,
+                rates[name],
             )
             for name, instances_ in self._happening.items()
             for each in instances_
         ]
         return tuple(sorted(found, key=lambda event: (event.round, event.name)))
+
+    @staticmethod
+    def _unknown_rates(
+        events: Iterable[gt.GroundEvent], actions: Iterable[gt.GroundAction]
+    ) -> Iterator[Diagnostic]:
+        """An error for each kind of action beside which events by time cannot be drawn."""
+        by_time = [event for event in events if event.rate == "second"]
+        told: set[str] = set()
+        for action in actions if by_time else ():
+            if isinstance(action.duration, LogNormal) and action.schema not in told:
+                told.add(action.schema)
+                message = f"event `{by_time[0].schema}` is drawn by time, and `{action.schema}` is lognormal"
+                hint = "give it another duration: `(triangular least likely most)`, or `(empirical …)`"
+                yield Diagnostic("BBT0452", message, action.span, hint)
 
     def is_action(self, name: str, row: Row) -> bool:
         """Whether an action with these arguments can ever apply."""

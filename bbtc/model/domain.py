@@ -13,7 +13,18 @@ from typing import Literal, TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
-from bbtc.model.effect import NOTHING, Add, Choice, Effect, LiftedDuration, Set, TimeOut, Together, leaves
+from bbtc.model.effect import (
+    NOTHING,
+    Add,
+    Choice,
+    Effect,
+    LiftedDuration,
+    Set,
+    TimeOut,
+    Together,
+    leaves,
+    settings,
+)
 from bbtc.model.formula import And, Atom, Formula, Term
 from bbtc.model.types import Object, Parameter, TypeHierarchy
 from bbtc.source import Span
@@ -37,12 +48,46 @@ class Predicate:
 
 
 @dataclass(frozen=True, slots=True)
+class NumberRange:
+    """The whole numbers from ``low`` to ``high``. What would leave the range ends at its bound; where it
+    ``blocks``, an action that may leave it does not start."""
+
+    low: int
+    high: int
+    blocks: bool = False
+    found: bool = False
+    """It is not declared, but found: nothing may lead out of it."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def digits(self) -> int:
+        """How many binary digits it takes."""
+        return max(1, (self.high - self.low).bit_length())
+
+
+_NUMBER = "number "
+
+
+def number_predicate(function: str) -> str:
+    """The predicate that stands for the numbers of a function until it is settled how they are written; no
+    file can name it."""
+    return _NUMBER + function
+
+
+def is_number(predicate: str) -> bool:
+    """Does a predicate stand for numbers?"""
+    return predicate.startswith(_NUMBER)
+
+
+@dataclass(frozen=True, slots=True)
 class Function:
-    """A numeric function that ``:init`` gives values to."""
+    """A numeric function that ``:init`` gives values to. Those that actions change have a ``range``, declared
+    or found (:mod:`bbtc.ground.numbers.ranges`)."""
 
     name: str
     parameters: tuple[Parameter, ...]
     span: Span | None = field(default=None, compare=False, repr=False)
+    range: NumberRange | None = None
 
 
 Rate: TypeAlias = Literal["action", "second"]
@@ -71,6 +116,8 @@ class Schema:
     repeats: bool = False
     told: tuple[Reading, ...] = ()
     """What is told besides."""
+    uninterruptible: bool = False
+    """While it runs, nothing preempts it."""
     during: Formula | None = None
     """While this is true the action goes on; else it ends, with the effect ``on_abort``."""
     on_abort: Effect = NOTHING
@@ -328,9 +375,8 @@ def set_values(model: Model) -> dict[str, set[Truth]]:
     """The values that actions may give the atoms of each predicate that any sets."""
     found: dict[str, set[Truth]] = {}
     for schema in model.schemas.values():
-        for leaf in leaves(schema.effects, possible=True):
-            if isinstance(leaf, Set):
-                found.setdefault(leaf.predicate, set()).add(leaf.value)
+        for each in settings(schema.effects, possible=True):
+            found.setdefault(each.predicate, set()).add(each.value)
     return found
 
 

@@ -11,10 +11,14 @@ from typing_extensions import assert_never
 
 from bbtc.durations import Duration, Empirical, Fixed, LogNormal, Triangular, Uniform
 from bbtc.kleene import Truth
-from bbtc.model.formula import Formula, Term
+from bbtc.model.amount import Amount, Arithmetic, Constant, FunctionValue
+from bbtc.model.amount import substitute as substitute_amount
+from bbtc.model.formula import Atom, Formula, Term, substitute_atom
 from bbtc.model.formula import substitute as substitute_formula
 from bbtc.model.types import Parameter
 from bbtc.source import Span
+
+__all__ = ["Amount", "Arithmetic", "Constant", "FunctionValue"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,34 +80,6 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
-class Constant:
-    """A number."""
-
-    value: Fraction
-
-
-@dataclass(frozen=True, slots=True)
-class FunctionValue:
-    """A number given in ``:init`` that no action changes, e.g. ``(distance ?a ?b)``."""
-
-    function: str
-    args: tuple[Term, ...]
-    span: Span | None = field(default=None, compare=False, repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class Arithmetic:
-    """``+ - * /`` over amounts."""
-
-    operator: str
-    operands: tuple[Amount, ...]
-    span: Span | None = field(default=None, compare=False, repr=False)
-
-
-Amount: TypeAlias = Constant | FunctionValue | Arithmetic
-
-
-@dataclass(frozen=True, slots=True)
 class LiftedDuration:
     """How long an action takes: a number of seconds, or a distribution of them (:mod:`bbtc.durations`)."""
 
@@ -151,7 +127,26 @@ class Add:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
-Effect: TypeAlias = Set | Together | When | ForEach | Choice | Add
+Operator: TypeAlias = Literal["increase", "decrease", "assign", "scale-up", "scale-down"]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Changes a number. ``digits`` are the facts that it is written in, once that is settled
+    (:mod:`bbtc.ground.numbers.digits`)."""
+
+    function: str
+    args: tuple[Term, ...]
+    operator: Operator
+    amount: Amount
+    digits: tuple[Atom, ...] = ()
+    reads: tuple[Atom, ...] = ()
+    """The digits of the numbers that the amount reads."""
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
+Leaf: TypeAlias = Set | Add | Change
+Effect: TypeAlias = Set | Together | When | ForEach | Choice | Add | Change
 NOTHING = Together(())
 
 
@@ -163,7 +158,7 @@ def walk(effect: Effect, *, possible: bool = False) -> Iterator[Effect]:
         each = waiting.pop()
         yield each
         match each:
-            case Set() | Add():
+            case Set() | Add() | Change():
                 pass
             case Together(parts):
                 waiting.extend(reversed(parts))
@@ -184,14 +179,36 @@ def both_ways(effects: Sequence[Effect]) -> bool:
             return False
 
 
-def leaves(effect: Effect, *, possible: bool = False) -> Iterator[Set | Add]:
+def leaves(effect: Effect, *, possible: bool = False) -> Iterator[Leaf]:
     """Everything the effect does somewhere; ``possible`` as in :func:`walk`."""
-    return (part for part in walk(effect, possible=possible) if isinstance(part, Set | Add))
+    return (part for part in walk(effect, possible=possible) if isinstance(part, Set | Add | Change))
 
 
-def settings(effect: Effect) -> Iterator[Set]:
-    """Every setting in the effect."""
-    return (leaf for leaf in leaves(effect) if isinstance(leaf, Set))
+def sets_of(leaf: Leaf) -> tuple[Set, ...]:
+    """What a leaf may set: of a number, each of its digits, either way."""
+    match leaf:
+        case Set():
+            return (leaf,)
+        case Add():
+            return ()
+        case Change():
+            return tuple(
+                Set(digit.predicate, digit.args, value, leaf.span)
+                for digit in leaf.digits
+                for value in (Truth.TRUE, Truth.FALSE)
+            )
+        case _:
+            assert_never(leaf)
+
+
+def settings(effect: Effect, *, possible: bool = False) -> Iterator[Set]:
+    """Every setting in the effect, those of digits included."""
+    return (each for leaf in leaves(effect, possible=possible) for each in sets_of(leaf))
+
+
+def changes(effect: Effect) -> Iterator[Change]:
+    """Every change of a number in the effect."""
+    return (leaf for leaf in leaves(effect) if isinstance(leaf, Change))
 
 
 def earns(effect: Effect) -> bool:
@@ -210,7 +227,17 @@ def substitute(effect: Effect, binding: dict[str, Term]) -> Effect:
         case Set(predicate, args, value, span):
             return Set(predicate, tuple(binding.get(a, a) for a in args), value, span)
         case Add(to, amount, sign, span):
-            return Add(to, _substitute_amount(amount, binding), sign, span)
+            return Add(to, substitute_amount(amount, binding), sign, span)
+        case Change(function, args, operator, amount, digits, read, span):
+            return Change(
+                function,
+                tuple(binding.get(a, a) for a in args),
+                operator,
+                substitute_amount(amount, binding),
+                tuple(substitute_atom(each, binding) for each in digits),
+                tuple(substitute_atom(each, binding) for each in read),
+                span,
+            )
         case Together(parts, span):
             return Together(tuple(substitute(part, binding) for part in parts), span)
         case When(condition, inner, span):
@@ -228,23 +255,25 @@ def substitute_duration(duration: LiftedDuration | None, binding: dict[str, Term
     """The duration with free parameters replaced."""
     if duration is None:
         return None
-    return replace(duration, amounts=tuple(_substitute_amount(each, binding) for each in duration.amounts))
+    return replace(duration, amounts=tuple(substitute_amount(each, binding) for each in duration.amounts))
+
+
+def functions_timing(duration: LiftedDuration | None, timeout: TimeOut | None) -> Iterator[str]:
+    """The functions that a duration and a time-out read, repeats included."""
+    waiting = [] if duration is None else list(duration.amounts)
+    waiting += [] if timeout is None else [timeout.seconds]
+    while waiting:
+        match waiting.pop():
+            case FunctionValue(function):
+                yield function
+            case Arithmetic(_, operands):
+                waiting.extend(operands)
+            case Constant():
+                pass
 
 
 def _substitute_timeout(timeout: TimeOut | None, binding: dict[str, Term]) -> TimeOut | None:
     if timeout is None:
         return None
-    seconds = _substitute_amount(timeout.seconds, binding)
+    seconds = substitute_amount(timeout.seconds, binding)
     return replace(timeout, seconds=seconds, duration=substitute_duration(timeout.duration, binding))
-
-
-def _substitute_amount(amount: Amount, binding: dict[str, Term]) -> Amount:
-    match amount:
-        case Constant():
-            return amount
-        case FunctionValue(function, args, span):
-            return FunctionValue(function, tuple(binding.get(a, a) for a in args), span)
-        case Arithmetic(operator, operands, span):
-            return Arithmetic(operator, tuple(_substitute_amount(o, binding) for o in operands), span)
-        case _:
-            assert_never(amount)

@@ -6,13 +6,15 @@ renames them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from typing_extensions import assert_never
 
 from bbtc.kleene import Truth
+from bbtc.model.amount import Amount, functions
+from bbtc.model.amount import substitute as substitute_amount
 from bbtc.model.types import Parameter
 from bbtc.source import Span
 
@@ -51,6 +53,22 @@ class Equal:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
+Comparator: TypeAlias = Literal["<", "<=", "=", "!=", ">=", ">"]
+OPPOSITE: Mapping[Comparator, Comparator] = {"<": ">=", "<=": ">", "=": "!=", "!=": "=", ">=": "<", ">": "<="}
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """How two numbers compare; two-valued. ``digits`` are the facts that those which change are written in,
+    once that is settled (:mod:`bbtc.ground.numbers.digits`)."""
+
+    operator: Comparator
+    left: Amount
+    right: Amount
+    digits: tuple[Atom, ...] = ()
+    span: Span | None = field(default=None, compare=False, repr=False)
+
+
 @dataclass(frozen=True, slots=True)
 class Not:
     """Kleene negation."""
@@ -85,7 +103,7 @@ class Quantified:
     span: Span | None = field(default=None, compare=False, repr=False)
 
 
-Formula: TypeAlias = Atom | Test | Equal | Not | And | Or | Quantified
+Formula: TypeAlias = Atom | Test | Equal | Compare | Not | And | Or | Quantified
 ALWAYS = And(())
 NEVER = Or(())
 
@@ -116,6 +134,10 @@ def readings(formula: Formula, negative: bool = False) -> Iterator[Reading]:
             yield Reading(atom, Truth.UNKNOWN if unknown else None, span)
         case Equal():
             return
+        case Compare(_, _, _, digits, span):
+            for digit in digits:
+                for value in (Truth.TRUE, Truth.FALSE):
+                    yield Reading(digit, value, span)
         case Not(part):
             yield from readings(part, not negative)
         case And(parts) | Or(parts):
@@ -127,9 +149,30 @@ def readings(formula: Formula, negative: bool = False) -> Iterator[Reading]:
             assert_never(formula)
 
 
+def comparisons(formula: Formula) -> Iterator[Compare]:
+    """The comparisons of numbers in a condition; what is denied is not among them."""
+    match formula:
+        case Compare():
+            yield formula
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from comparisons(part)
+        case Quantified(_, _, part):
+            yield from comparisons(part)
+        case Atom() | Test() | Equal() | Not():
+            return
+        case _:
+            assert_never(formula)
+
+
 def atoms(formula: Formula) -> Iterator[Atom]:
     """The atoms a formula reads, tests included, from left to right."""
     return (reading.atom for reading in readings(formula))
+
+
+def substitute_atom(atom: Atom, binding: dict[str, Term]) -> Atom:
+    """The atom with free parameters replaced."""
+    return Atom(atom.predicate, tuple(binding.get(a, a) for a in atom.args), atom.span)
 
 
 def substitute(formula: Formula, binding: dict[str, Term]) -> Formula:
@@ -139,8 +182,15 @@ def substitute(formula: Formula, binding: dict[str, Term]) -> Formula:
         case Atom(predicate, args, span):
             return Atom(predicate, tuple(binding.get(a, a) for a in args), span)
         case Test(kind, atom, span):
-            args = tuple(binding.get(a, a) for a in atom.args)
-            return Test(kind, Atom(atom.predicate, args, atom.span), span)
+            return Test(kind, substitute_atom(atom, binding), span)
+        case Compare(operator, left, right, digits, span):
+            return Compare(
+                operator,
+                substitute_amount(left, binding),
+                substitute_amount(right, binding),
+                tuple(substitute_atom(digit, binding) for digit in digits),
+                span,
+            )
         case Equal(left, right, span):
             return Equal(binding.get(left, left), binding.get(right, right), span)
         case Not(part, span):
@@ -163,11 +213,16 @@ def free(formula: Formula) -> dict[str, None]:
 
 
 def _free(formula: Formula, bound: frozenset[str], found: dict[str, None]) -> None:
+    terms: tuple[Term, ...]
     match formula:
         case Atom(_, args) | Test(_, Atom(_, args)):
             terms = args
         case Equal(left, right):
             terms = (left, right)
+        case Compare(_, left_side, right_side):
+            terms = tuple(
+                arg for side in (left_side, right_side) for value in functions(side) for arg in value.args
+            )
         case Not(part):
             _free(part, bound, found)
             return

@@ -21,6 +21,9 @@
    tree is not asked for, plan as in 3 and 4 once more, for what others may make of visited states, too
    (:mod:`bbtc.planner.elsewhere`).
 
+Where there are numbers: the rules of 1, an optimal policy, and the rules of 7; what else there is asks for
+facts one by one.
+
 Where facts are hidden: an optimal policy over what is believed, a search over refinements, and, where neither
 met the target, greedy refinement.
 
@@ -120,6 +123,7 @@ def plan_advised(
     :func:`plan_auto`, and as that does."""
     advised = None
     follows = options.prefer == "success" and options.retries == "unbounded" and options.max_actions is None
+    follows = follows and not task.numbers
     if task.templates and len(task.actions) <= MANY_ACTIONS and follows:
         advised = _refined(task, target, limits, limits.nodes, options)
         if advised.tree.status in {"target-reached", "interrupted"}:
@@ -207,6 +211,9 @@ class _Auto:
             return
         if self.learns(_FEW_STATES, everywhere=True) and self.proven:
             return
+        if self.task.numbers:
+            self.of_numbers()
+            return
         self.begun = len(self.candidates)
         self.add(self.searched(replace(self.limits, effort=Effort(_LOOKS_FIRST))))
         for step in (self.of_few_states, self.surely, self.searched_on, self.of_all_states):
@@ -230,6 +237,13 @@ class _Auto:
             self.add(self.searched(limits))
         if not self.interrupted and not self.met:
             self.add(self.refinement(refined))
+
+    def of_numbers(self) -> None:
+        """Plans where there are numbers."""
+        self.add(plan_policy(self.task, self.target, self.limits, _silent, self.options))
+        if not self.interrupted and not self.options.closed_world:
+            with suppress(LimitReached):
+                self.go_on_from_elsewhere()
 
     def looked_at(self, candidate: _Candidate) -> _Candidate:
         """What the tree does from where others may leave the world; nothing good if that takes too long."""
@@ -260,7 +274,7 @@ class _Auto:
             wider = also_at(task, starts)
             self.add_for_own_starts(plan_policy(wider, self.target, few, _silent, self.inner, whole=True))
         surely = any(plan.tree.success_probability == 1 and plan.chain is not None for plan in self.plans)
-        if surely and not task.events:
+        if surely and not task.events and not task.numbers:
             self.surely_from(starts)
 
     def learns(self, most: int, *, everywhere: bool = False) -> bool:

@@ -63,8 +63,10 @@ class ChangingFacts:
 
     @classmethod
     def of(cls, task: Task, limits: Limits) -> ChangingFacts:
-        """Raises :class:`bbtc.diagnostics.LimitReached` when the time is over."""
-        groups = exclusive_groups(task, limits)
+        """Raises :class:`bbtc.diagnostics.LimitReached` when the time is over. Numbers change by actions
+        alone."""
+        digits = {variable for number in task.numbers for variable in number.digits}
+        groups = [each for each in exclusive_groups(task, limits) if digits.isdisjoint(each.members)]
         taken: set[int] = set()
         movables: list[Movable] = []
         for group in sorted(groups, key=lambda each: (not each.always, -len(each.members), each.members)):
@@ -75,7 +77,9 @@ class ChangingFacts:
                 movables.append(Movable(own, emptied=not group.always or len(own) < len(group.members)))
         values = _values(task)
         movables.extend(
-            Movable((variable,), values[variable]) for variable in range(len(values)) if variable not in taken
+            Movable((variable,), values[variable])
+            for variable in range(len(values))
+            if variable not in taken and variable not in digits
         )
         movables.sort(key=lambda each: each.variables)
         around: dict[int, tuple[int, ...]] = {}

@@ -202,7 +202,7 @@ class _Learner:
         self.hopeful = ~found.prob_0 & ~space.goal
         self._hoping = self.hopeful[space.choice_state]
         values = space.packing.unpack(space.states)
-        self.literals = literals_of(values)
+        self.literals = literals_of(task, values)
         self.stated = Stated(task, self.literals)
         columns = [literal.holds(values) for literal in self.literals]
         self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(values), len(columns))

@@ -28,7 +28,7 @@ from bbtc.ground.condition import (
     replaced,
     variables,
 )
-from bbtc.ground.renumber import reordered
+from bbtc.ground.pruning.renumber import reordered
 from bbtc.ground.task import (
     ONE,
     Change,

@@ -28,8 +28,8 @@ class Strategy(Protocol):
 @dataclass(frozen=True, slots=True)
 class Entry:
     """Module and function of a strategy, imported when used, and which options it knows: ``max_actions`` is
-    refused where it does not; ``retries`` changes nothing there. ``hidden``, ``events``: does it plan with
-    hidden facts, with what happens by itself?"""
+    refused where it does not; ``retries`` changes nothing there. ``hidden``, ``events``, ``numbers``: does it
+    plan with hidden facts, with what happens by itself, with numbers?"""
 
     module: str
     function: str
@@ -37,6 +37,7 @@ class Entry:
     retries: bool = False
     hidden: bool = True
     events: bool = True
+    numbers: bool = True
 
     def load(self) -> Strategy:
         """The strategy."""
@@ -45,11 +46,15 @@ class Entry:
 
 
 STRATEGIES = {
-    "refine": Entry("bbtc.planner.chaining.refine", "refine"),
-    "search": Entry("bbtc.planner.chaining.search", "plan_search", retries=True),
+    "refine": Entry("bbtc.planner.chaining.refine", "refine", numbers=False),
+    "search": Entry("bbtc.planner.chaining.search", "plan_search", retries=True, numbers=False),
     "policy": Entry("bbtc.planner.synthesis.policy", "plan_policy", max_actions=True, retries=True),
     "strong-cyclic": Entry(
-        "bbtc.planner.strong_cyclic.plan", "plan_strong_cyclic", hidden=False, events=False
+        "bbtc.planner.strong_cyclic.plan",
+        "plan_strong_cyclic",
+        hidden=False,
+        events=False,
+        numbers=False,
     ),
     "auto": Entry("bbtc.planner.auto", "plan_auto", max_actions=True, retries=True),
     "advised": Entry("bbtc.planner.auto", "plan_advised", max_actions=True, retries=True),
@@ -93,6 +98,12 @@ def run_strategy(
             "BBT0505",
             f"the strategy '{name}' does not plan with events",
             hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.events)}",
+        )
+    if task.numbers and not STRATEGIES[name].numbers:
+        raise BbtcError.single(
+            "BBT0441",
+            f"the strategy '{name}' does not plan with numbers, such as {task.numbers[0].name}",
+            hint=f"use --strategy {next(name for name, entry in STRATEGIES.items() if entry.numbers)}",
         )
     if not options.closed_world:
         from bbtc.planner.guard import most_more

@@ -85,6 +85,8 @@ class _Naming:
         held = {part for each in (*tests, *own, action.precondition) for part in conjuncts(_normal(each))}
         brought = set(_brought_about(action, held)) - held
         for each in self.wanted:
+            if self.task.variables[each.variable].digit is not None:
+                continue
             if each in brought and (each in self.goal or isinstance(each, Known) or each.value is Truth.TRUE):
                 return f"for {describe(self.task, each)}"
         return None

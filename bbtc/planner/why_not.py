@@ -18,7 +18,7 @@ from bbtc.belief.draws import Values
 from bbtc.belief.scenarios import Scenario, scenarios
 from bbtc.belief.tick import NodeStatus
 from bbtc.diagnostics import LimitReached
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, conjuncts
 from bbtc.ground.describe import describe
 from bbtc.ground.repair import Every, Need, Repairs, Root, Some, Way, every, some
 from bbtc.ground.task import Effect, GroundAction, GroundEvent, Task, apparent_factors, effects_of
@@ -189,7 +189,7 @@ def _lacking(condition: Condition, facts: Facts) -> Need[_Fact] | None:
             return every(_lacking(part, facts) for part in parts)
         case Or(parts):
             return some(_lacking(part, facts) for part in parts)
-        case Not(_) | Constant(_):
+        case Not(_) | Constant(_) | Within():
             return Some(())
         case _:
             assert_never(condition)

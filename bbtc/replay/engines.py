@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
+from bbtc.backends.interface import BOUNDS
 from bbtc.backends.names import Symbol
 from bbtc.backends.pytrees.exporter import py_trees, py_trees_names
 from bbtc.ground.task import Task, ground_name
@@ -123,9 +124,14 @@ class PyTreesReplay(Replay):
             return act
 
         methods: dict[str, object] = {"cancel": lambda name: self._world.cancel(name)}  # noqa: PLW0108 - the world of then
+
+        def number(name: str) -> Callable[..., int]:
+            return lambda *args: number_in_world(self._task, self._world, ground_name(name, args))
+
+        makers: dict[str, Callable[[str], object]]
+        makers = {"predicate": condition, "function": number, "action": action}
         for symbol, method in self._names.methods.items():
-            make = condition if symbol.kind == "predicate" else action
-            methods[method] = make(symbol.name)
+            methods[method] = makers[symbol.kind](symbol.name)
         self._namespace = types.SimpleNamespace(**methods)
         return self._namespace
 
@@ -133,6 +139,13 @@ class PyTreesReplay(Replay):
         if self._monitor is not None:
             self._namespace.monitor = monitor_in(self._module, world)
             world.watch(self._namespace.monitor, self._monitor.known, starts=False)
+
+
+def number_in_world(task: Task, world: World, name: str) -> int:
+    """The value that a number of a task has in a world."""
+    number = task.number_by_name[name]
+    digits = (world.read(task.variables[digit].name) for digit in number.digits)
+    return number.low + sum((value >> 1) << place for place, value in enumerate(digits))
 
 
 def _load(source: str) -> Any:
@@ -237,18 +250,24 @@ class BtcppReplay(Replay):
                     symbol = symbols[element.tag]
                     ports = names.interface.leaves[symbol].parameters
                     values = [element.attrib.pop(port) for port in ports]
+                    spans = [element.attrib.pop(port, "") for port in BOUNDS if symbol.kind == "function"]
                     assert all(key == "name" or key.startswith("_") for key in element.attrib)
-                    key = (element.tag, *values)
+                    key = (element.tag, *values, *spans)
                     if key not in known:
                         known[key] = f"Leaf{len(known)}"
-                        self._register_leaf(known[key], symbol, values, objects)
+                        self._register_leaf(known[key], symbol, values, objects, spans)
                     element.tag = known[key]
         for model in document.findall("TreeNodesModel"):
             for entry in [entry for entry in model if entry.tag in ("Action", "Condition")]:
                 model.remove(entry)
 
     def _register_leaf(
-        self, node_id: str, symbol: Symbol, values: list[str], objects: Mapping[str, str]
+        self,
+        node_id: str,
+        symbol: Symbol,
+        values: list[str],
+        objects: Mapping[str, str],
+        spans: list[str],
     ) -> None:
         status = self._engine.NodeStatus
         truth = {0: status.FAILURE, 1: status.RUNNING, 2: status.SUCCESS}
@@ -281,6 +300,17 @@ class BtcppReplay(Replay):
             self._factory.register_simple_condition(
                 node_id, safely(lambda node, world: truth[world.read(ground(node))])
             )
+            return
+
+        if symbol.kind == "function":
+            least, most = spans
+
+            def compare(node: Any, world: World) -> object:
+                value = number_in_world(self._task, world, ground(node))
+                inside = (not least or int(least) <= value) and (not most or value <= int(most))
+                return status.SUCCESS if inside else status.FAILURE
+
+            self._factory.register_simple_condition(node_id, safely(compare))
             return
 
         def start(node: Any, world: World) -> object:

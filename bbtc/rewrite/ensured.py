@@ -18,7 +18,7 @@ from typing import TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.belief.tick import STARTED, NodeStatus
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, negation
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, in_digits, negation
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth, negate
 from bbtc.tree.nodes import COUNTING, ActionNode, ConditionNode, ControlKind, ControlNode, Node, actions_of
@@ -68,6 +68,8 @@ def at_least(condition: Condition, value: Truth) -> Formula:
             return Among(variable, 1 << Truth.UNKNOWN)
         case Known(variable):
             return Among(variable, _TWO)
+        case Within():
+            return at_least(in_digits(condition), value)
         case And(parts):
             return All(tuple([at_least(part, value) for part in parts]))
         case Or(parts):

@@ -4,8 +4,9 @@ runtime=imported``, they import it from here. It needs py_trees (2.2 or later) a
 from __future__ import annotations
 
 from bbtc.runtime.beliefs import Beliefs
+from bbtc.runtime.limits import Within, within
 from bbtc.runtime.monitor import HiddenWorld, Monitor, Move, Part, StopOutside, Telling, Walk, watched
-from bbtc.runtime.moving import MovingWorld, Test
+from bbtc.runtime.moving import MovingWorld, Rounds, Test
 from bbtc.runtime.nodes import (
     Action,
     Condition,
@@ -16,6 +17,7 @@ from bbtc.runtime.nodes import (
     StopWhenBlocked,
     Try,
     UntilSuccess,
+    View,
     WithBeliefs,
     WithSetup,
     all_of,
@@ -28,6 +30,16 @@ from bbtc.runtime.nodes import (
     sequence,
     skipper,
     until_success,
+    view,
+)
+from bbtc.runtime.numbers import (
+    MovingNumberWorld,
+    NumberBeliefs,
+    NumberWorld,
+    Shift,
+    Values,
+    between,
+    on_numbers,
 )
 from bbtc.runtime.world import Factor, Outcome, State, When, World, draw, happen, simulate
 
@@ -41,10 +53,15 @@ __all__ = [
     "Latch",
     "Monitor",
     "Move",
+    "MovingNumberWorld",
     "MovingWorld",
+    "NumberBeliefs",
+    "NumberWorld",
     "Outcome",
     "Part",
     "Retry",
+    "Rounds",
+    "Shift",
     "Skipper",
     "State",
     "StopOutside",
@@ -53,23 +70,30 @@ __all__ = [
     "Test",
     "Try",
     "UntilSuccess",
+    "Values",
+    "View",
     "Walk",
     "When",
     "WithBeliefs",
     "WithSetup",
+    "Within",
     "World",
     "all_of",
     "any_of",
+    "between",
     "draw",
     "fallback",
     "happen",
     "in_words",
     "negated",
+    "on_numbers",
     "retry",
     "run",
     "sequence",
     "simulate",
     "skipper",
     "until_success",
+    "view",
     "watched",
+    "within",
 ]

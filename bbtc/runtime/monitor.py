@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
-from typing import Protocol
+from typing import Protocol, cast
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -173,7 +173,7 @@ class StopOutside(StopWhenBlocked):
         self, robot: WithMonitor, child: Behaviour, reads: Mapping[Fact, bool] | None = None
     ) -> None:
         super().__init__(robot, child, reads)
-        self._watching = robot
+        self._watching = cast("WithMonitor", self._robot)
 
     def tick(self) -> Iterator[Behaviour]:
         monitor = self._watching.monitor

@@ -11,11 +11,12 @@ from bbtc.runtime.nodes import Fact, in_words
 from bbtc.runtime.world import Factor, State, World, happen
 
 Test = Callable[[State], bool | None]
+Rounds = list[list[tuple[Test, list[Factor]]]]
 
 
 class MovingWorld(World):
-    """A world with events. ``events`` are those of each round: where one may happen, and what it does. Of the
-    actions that events may end: while what they go on, and what happens else."""
+    """A world with events. ``events`` are, for each action, those of each round: where one may happen, and
+    what it does. Of the actions that events may end: while what they go on, and what happens else."""
 
     def __init__(
         self,
@@ -24,7 +25,7 @@ class MovingWorld(World):
         rng: random.Random,
         report: Callable[[str], None],
         *,
-        events: list[list[tuple[Test, list[Factor]]]],
+        events: dict[Fact, Rounds],
         interrupted: dict[Fact, tuple[Test, list[Factor]]],
     ) -> None:
         super().__init__(initial, actions, rng, report)
@@ -34,9 +35,9 @@ class MovingWorld(World):
     def _act(self, *action: str) -> Status:
         if action not in self._interrupted:
             status = super()._act(*action)
-            self._happen()
+            self._happen(*action)
             return status
-        self._happen()
+        self._happen(*action)
         goes_on, abort = self._interrupted[action]
         if goes_on(self._state) is True:
             return super()._act(*action)
@@ -44,9 +45,9 @@ class MovingWorld(World):
         self._report(f"{in_words(action)}: aborted")
         return Status.SUCCESS
 
-    def _happen(self) -> None:
+    def _happen(self, *action: str) -> None:
         """The events of one draw: those of a round all read the state that it begins with."""
-        for events in self._events:
+        for events in self._events[action]:
             due = [factors for test, factors in events if test(self._state) is True]
             changes = happen(self._rng, [factor for factors in due for factor in factors], self._state)
             words = {True: "true", False: "false", None: "unknown"}

@@ -37,11 +37,13 @@ from bbtc.syntax.formulas import Unsupported as Unsupported
 from bbtc.syntax.formulas import When as When
 from bbtc.syntax.terms import Arithmetic as Arithmetic
 from bbtc.syntax.terms import Atom as Atom
+from bbtc.syntax.terms import Comparison as Comparison
 from bbtc.syntax.terms import Empty as Empty
 from bbtc.syntax.terms import Equality as Equality
 from bbtc.syntax.terms import FluentRef as FluentRef
 from bbtc.syntax.terms import Name as Name
 from bbtc.syntax.terms import Number as Number
+from bbtc.syntax.terms import NumberRange as NumberRange
 from bbtc.syntax.terms import NumericExpression as NumericExpression
 from bbtc.syntax.terms import Term as Term
 from bbtc.syntax.terms import TypedGroup as TypedGroup
@@ -93,12 +95,13 @@ class Predicates:
 
 @dataclass(frozen=True, slots=True)
 class FunctionDeclaration:
-    """``(name params) - type`` within ``:functions``."""
+    """``(name params) - type`` within ``:functions``, or with a range as its type."""
 
     name: Name
     parameters: TypedList
     types: tuple[Name, ...]
     span: Span = span_field()
+    range: NumberRange | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,8 @@ class Functions:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """``(:action name :parameters … :precondition … :observe … :repeats :effect … :while … :on-abort …)``."""
+    """``(:action name :parameters … :precondition … :observe … :repeats :uninterruptible :effect …
+    :while … :on-abort …)``."""
 
     name: Name
     parameters: TypedList
@@ -120,10 +124,72 @@ class Action:
     effect: Effect | None
     span: Span = span_field()
     repeats: bool = False
+    uninterruptible: bool = False
     during: Formula | None = None
     on_abort: Effect | None = None
-
     timing: Timing | None = None
+
+
+Moment: TypeAlias = Literal["at start", "over all", "at end"]
+
+
+@dataclass(frozen=True, slots=True)
+class TimedFormula:
+    """``(at start f)``, ``(over all f)``, ``(at end f)``."""
+
+    when: Moment
+    formula: Formula
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedChange:
+    """``(at start e)``, ``(at end e)``."""
+
+    when: Moment
+    effect: Effect
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedAll:
+    """``(and t…)`` of a durative action; without parts also ``()``."""
+
+    parts: tuple[Timed, ...]
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedForall:
+    """``(forall (params) t)``."""
+
+    parameters: TypedList
+    part: Timed
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class TimedWhen:
+    """``(when t t)``, a condition and an effect."""
+
+    condition: Timed
+    effect: Timed
+    span: Span = span_field()
+
+
+Timed: TypeAlias = TimedFormula | TimedChange | TimedAll | TimedForall | TimedWhen
+
+
+@dataclass(frozen=True, slots=True)
+class DurativeAction:
+    """``(:durative-action name :parameters … :duration (= ?duration n) :condition … :effect …)``."""
+
+    name: Name
+    parameters: TypedList
+    duration: NumericExpression
+    condition: Timed | None
+    effect: Timed | None
+    span: Span = span_field()
 
 
 @dataclass(frozen=True, slots=True)
@@ -407,6 +473,7 @@ Section: TypeAlias = (
     | Predicates
     | Functions
     | Action
+    | DurativeAction
     | Exogenous
     | Derived
     | Sensor

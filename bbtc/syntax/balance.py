@@ -33,7 +33,16 @@ _SECTIONS = frozenset(
 )
 _FIELDS = {
     ":action": frozenset(
-        (":parameters", ":precondition", ":observe", ":sensing-model", ":observation", ":repeats", ":effect")
+        (
+            ":parameters",
+            ":precondition",
+            ":observe",
+            ":sensing-model",
+            ":observation",
+            ":repeats",
+            ":uninterruptible",
+            ":effect",
+        )
     ),
     ":observation": frozenset((":parameters", ":condition", ":distribution")),
     ":template": frozenset((":parameters", ":precondition", ":effect", ":body")),

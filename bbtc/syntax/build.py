@@ -21,6 +21,9 @@ from bbtc.syntax.fields import (
     Condition,
     Distribution,
     Duration,
+    DurativeCondition,
+    DurativeDuration,
+    DurativeEffect,
     During,
     Effect,
     Field,
@@ -35,6 +38,8 @@ from bbtc.syntax.fields import (
     Sensed,
     Timeout,
     TimeoutProbability,
+    Uninterruptible,
+    observed,
 )
 from bbtc.syntax.leaves import Misuse
 
@@ -58,10 +63,20 @@ _DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[
 """Distributions of durations, and what numbers they take."""
 
 
+_HOW_LONG = "write `(= ?duration n)`; or use an `:action`, with `:duration (uniform a b)` for one that varies"
+
+
 class Types(NamedTuple):
     """``- type`` or ``- (either type…)`` behind names."""
 
     names: tuple[ast.Name, ...]
+    span: Span
+
+
+class NumberRange(NamedTuple):
+    """``- (int low high)`` behind a function, with what it spans."""
+
+    range: ast.NumberRange
     span: Span
 
 
@@ -166,12 +181,22 @@ class Builder(Expressions):
         return ast.Functions(tuple(declarations), head.to(close))
 
     def function(
-        self, head: Token, parameters: ast.TypedList, close: Token, types: Types | None = None
+        self,
+        head: Token,
+        parameters: ast.TypedList,
+        close: Token,
+        types: Types | NumberRange | None = None,
     ) -> _Function:
         return _function(next(leaves.names(head)), parameters, head.to(close), types)
 
-    def function_bare(self, name: Token, types: Types | None = None) -> _Function:
+    def function_bare(self, name: Token, types: Types | NumberRange | None = None) -> _Function:
         return _function(leaves.name(name), (), name.span, types)
+
+    def number_range(self, dash: Token, head: Token, low: Token, high: Token, *rest: Token) -> NumberRange:
+        policy = leaves.name(rest[0]) if len(rest) > 1 else None
+        span = head.to(rest[-1])
+        given = ast.NumberRange(self.number(low), self.number(high), policy, span)
+        return NumberRange(given, dash.to(rest[-1]))
 
     # --- actions and the like ----------------------------------------------------------------
 
@@ -185,6 +210,7 @@ class Builder(Expressions):
             fields.get(Effect),
             head.to(close),
             fields.get(Repeats) is True,
+            fields.get(Uninterruptible) is True,
             fields.get(During),
             fields.get(OnAbort),
             _timing(fields, head.to(close)),
@@ -263,6 +289,40 @@ class Builder(Expressions):
     def repeats(self, keyword: Token) -> Repeats:
         return Repeats(keyword, True)
 
+    def uninterruptible(self, keyword: Token) -> Uninterruptible:
+        return Uninterruptible(keyword, True)
+
+    def durative_action(
+        self, head: Token, name: Token, given: list[Field[object]], close: Token
+    ) -> ast.DurativeAction:
+        fields = Fields(given)
+        return ast.DurativeAction(
+            leaves.name(name),
+            fields.parameters(close),
+            fields.need(DurativeDuration, ":duration", "the durative action", name),
+            fields.get(DurativeCondition),
+            fields.get(DurativeEffect),
+            head.to(close),
+        )
+
+    durative_condition = DurativeCondition
+    durative_effect = DurativeEffect
+
+    def durative_duration(
+        self, keyword: Token, _: Token, variable: Token, operand: Operand, _close: Token
+    ) -> DurativeDuration:
+        if variable.text.lower() != "?duration":
+            raise Misuse("BBT0101", "a duration is given as `(= ?duration n)`", variable.span)
+        return DurativeDuration(keyword, _seconds(keyword, operand))
+
+    def duration_open(self, _: Token, empty: Token) -> DurativeDuration:
+        raise Misuse("BBT0449", "an action that takes any time is not supported", empty.span, _HOW_LONG)
+
+    def duration_bounded(self, _: Token, head: Token, _forms: list[None], close: Token) -> DurativeDuration:
+        raise Misuse(
+            "BBT0449", "a duration that the planner chooses is not supported", head.to(close), _HOW_LONG
+        )
+
     def duration(self, keyword: Token, operand: Operand) -> Duration:
         expression = _seconds(keyword, operand)
         return Duration(keyword, ast.Duration("number", (expression,), (), expression.span))
@@ -298,10 +358,10 @@ class Builder(Expressions):
         return TimeoutProbability(keyword, self.number(number))
 
     def observe(self, keyword: Token, formulas: list[ast.Formula]) -> Observe:
-        return Observe(keyword, _observed(formulas))
+        return Observe(keyword, observed(formulas))
 
     def sensed(self, keyword: Token, formulas: list[ast.Formula]) -> Sensed:
-        return Sensed(keyword, _observed(formulas))
+        return Sensed(keyword, observed(formulas))
 
     def sensed_noisy(self, keyword: Token, content: ast.Probabilistic) -> Sensed:
         return Sensed(keyword, ast.Observation(content, content.span))
@@ -459,6 +519,11 @@ class Builder(Expressions):
     def body_retry(self, head: Token, number: Token, child: ast.Body, close: Token) -> ast.BodyRetry:
         return ast.BodyRetry(self.number(number), child, head.to(close))
 
+    def body_timeout(self, head: Token, _number: Token, _child: ast.Body, close: Token) -> ast.Body:
+        message = "a time limit on a part of a body is not supported"
+        hint = "give the action one: `:timeout`, which every tree keeps"
+        raise Misuse("BBT0450", message, head.to(close), hint)
+
     def body_condition(self, head: Token, formula: ast.Formula, close: Token) -> ast.BodyCondition:
         return ast.BodyCondition(formula, head.to(close))
 
@@ -500,13 +565,6 @@ def _seconds(head: Token, operand: Operand) -> ast.NumericExpression:
     return expression
 
 
-def _observed(formulas: list[ast.Formula]) -> ast.Observation:
-    first, last = formulas[0].span, formulas[-1].span
-    span = Span(first.source, first.start, last.end)
-    content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
-    return ast.Observation(content, span)
-
-
 def _state_variable(
     head: Token, name: ast.Name, parameters: ast.TypedList | None, values: list[ast.Formula], close: Token
 ) -> ast.StateVariable:
@@ -530,11 +588,15 @@ def _predicate(name: ast.Name, parameters: ast.TypedList, span: Span, unknown: b
     return ast.PredicateDeclaration(leaves.declared("predicate", name), parameters, unknown, span)
 
 
-def _function(name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | None) -> _Function:
+def _function(
+    name: ast.Name, parameters: ast.TypedList, span: Span, types: Types | NumberRange | None
+) -> _Function:
     declared = leaves.declared("function", name)
     if types is None:
         return ast.FunctionDeclaration(declared, parameters, (), span)
     whole = Span(span.source, span.start, types.span.end)
+    if isinstance(types, NumberRange):
+        return ast.FunctionDeclaration(declared, parameters, (), whole, types.range)
     return ast.FunctionDeclaration(declared, parameters, types.names, whole)
 
 

@@ -7,6 +7,7 @@ productions. Both give the same node; the docstring of either method names the o
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Literal, TypeAlias
 
 from bbtc.kleene import Truth
@@ -16,6 +17,7 @@ from bbtc.syntax.engine import Token
 from bbtc.syntax.hints import CONNECTIVES, NOT_IN_EFFECT, nearest
 from bbtc.syntax.leaves import Misuse
 
+_WHENS: Mapping[str, ast.Moment] = {"AT_START": "at start", "OVER_ALL": "over all", "AT_END": "at end"}
 Operand: TypeAlias = ast.Term | ast.NumericExpression | ast.Unsupported
 
 _WORD = re.compile(r"\??[^\s()?]+")
@@ -162,7 +164,7 @@ class Expressions:
 
     def comparison(
         self, head: Token, left: Operand, right: Operand, close: Token
-    ) -> ast.Equality | ast.Unsupported:
+    ) -> ast.Equality | ast.Comparison | ast.Unsupported:
         """The fast form of an equation is :meth:`equation`."""
         if head.kind == "EQUAL":
             first, second = _as_term(left), _as_term(right)
@@ -171,7 +173,10 @@ class Expressions:
                 return ast.Equality(first, second, head.to(close))
             if any(isinstance(side, ast.Name | ast.Variable | ast.Unsupported) for side in (left, right)):
                 return unsupported("object fluent", head, close)
-        return unsupported("numeric comparison", head, close)
+        one, other = numeric(left), numeric(right)
+        if one is None or other is None:
+            return unsupported("comparison of objects", head, close)
+        return ast.Comparison(head.text.lstrip("(").strip(), one, other, head.to(close))
 
     def equation(self, token: Token) -> ast.Equality:
         """The fast form of :meth:`comparison` for ``=`` between a name or variable and another."""
@@ -239,6 +244,32 @@ class Expressions:
         if isinstance(fluent, ast.FluentRef) and expression is not None:
             return ast.FluentEffect(keyword(head), fluent, expression, head.to(close))
         return unsupported("object fluent", head, close)
+
+    # --- durative actions ----------------------------------------------------------------------
+
+    def timed_formula(self, head: Token, formula: ast.Formula, close: Token) -> ast.TimedFormula:
+        return ast.TimedFormula(_WHENS[head.kind], formula, head.to(close))
+
+    def timed_change(self, head: Token, effect: ast.Effect, close: Token) -> ast.TimedChange:
+        return ast.TimedChange(_WHENS[head.kind], effect, head.to(close))
+
+    def timed_all(self, head: Token, parts: list[ast.Timed], close: Token) -> ast.TimedAll:
+        return ast.TimedAll(tuple(parts), head.to(close))
+
+    def timed_nothing(self, token: Token) -> ast.TimedAll:
+        return ast.TimedAll((), token.span)
+
+    def timed_forall(
+        self, head: Token, parameters: ast.TypedList, part: ast.Timed, close: Token
+    ) -> ast.TimedForall:
+        return ast.TimedForall(parameters_of(parameters, close), part, head.to(close))
+
+    def timed_when(self, head: Token, condition: ast.Timed, effect: ast.Timed, close: Token) -> ast.TimedWhen:
+        return ast.TimedWhen(condition, effect, head.to(close))
+
+    def timed_continuous(self, head: Token, _forms: list[None], close: Token) -> ast.TimedAll:
+        message = "a number that changes while an action runs is not supported"
+        raise Misuse("BBT0449", message, head.to(close), "effects stand in `(at start …)` or `(at end …)`")
 
     # --- what is refused by name -------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from bbtc.source import Span
 from bbtc.syntax import ast
 from bbtc.syntax.engine import Token
 from bbtc.syntax.expressions import parameters_of
@@ -47,8 +48,24 @@ class Repeats(Field[bool]):
     """``:repeats``."""
 
 
+class Uninterruptible(Field[bool]):
+    """``:uninterruptible``."""
+
+
 class Duration(Field[ast.Duration]):
     """``:duration``."""
+
+
+class DurativeDuration(Field[ast.NumericExpression]):
+    """``:duration`` of a durative action."""
+
+
+class DurativeCondition(Field[ast.Timed]):
+    """``:condition`` of a durative action."""
+
+
+class DurativeEffect(Field[ast.Timed]):
+    """``:effect`` of a durative action."""
 
 
 class Timeout(Field[ast.NumericExpression]):
@@ -117,3 +134,11 @@ class Fields:
     def parameters(self, close: Token) -> ast.TypedList:
         """The parameters of a form that ends with a token."""
         return parameters_of(self.get(Parameters) or (), close)
+
+
+def observed(formulas: list[ast.Formula]) -> ast.Observation:
+    """What ``:observe`` or ``:sensed`` lists."""
+    first, last = formulas[0].span, formulas[-1].span
+    span = Span(first.source, first.start, last.end)
+    content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
+    return ast.Observation(content, span)

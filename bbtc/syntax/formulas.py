@@ -9,6 +9,7 @@ from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax.terms import (
     Atom,
+    Comparison,
     Empty,
     Equality,
     FluentRef,
@@ -86,7 +87,7 @@ class Test:
 
 @dataclass(frozen=True, slots=True)
 class Unsupported:
-    """A construct that is recognised and refused by name (numeric comparison, preference, …)."""
+    """A construct that is recognised and refused by name (preference, object fluent, …)."""
 
     construct: str
     text: str
@@ -94,7 +95,7 @@ class Unsupported:
 
 
 Formula: TypeAlias = (
-    Atom | Empty | Equality | Not | And | Or | Imply | Quantified | Believed | Test | Unsupported
+    Atom | Empty | Equality | Comparison | Not | And | Or | Imply | Quantified | Believed | Test | Unsupported
 )
 
 

@@ -67,6 +67,7 @@ _FIELDS = {
     "OBSERVE": ":observe",
     "SENSED": ":sensed",
     "REPEATS": ":repeats",
+    "UNINTERRUPTIBLE": ":uninterruptible",
     "DISTRIBUTION": ":distribution",
     "CONTEXT": ":context",
     "IMPLIES": ":implies",

@@ -85,6 +85,7 @@ class _Docs:
                 | ast.DefaultSensing()
                 | ast.Observables()
                 | ast.InitBelief()
+                | ast.DurativeAction()
             ):
                 return self.of_dialect(node)
             case ast.DomainReference():
@@ -152,6 +153,37 @@ class _Docs:
         return Doc(
             head, (_leaf(node.name), *_in_source_order(fields)), ")", span, 1, broken=True, spaced=True
         )
+
+    def durative(self, node: ast.DurativeAction) -> Doc:
+        after, span = node.name.span.end, node.span
+        fields: list[Doc] = []
+        if node.parameters or self._word(":parameters", after, span):
+            fields.append(self.parameters(node.parameters, after, span, ":parameters"))
+        takes = Doc("(= ?duration", (self.expression(node.duration),), ")", node.duration.span, glued=1)
+        fields.append(self.field(":duration", takes, after, span))
+        for word, value in ((":condition", node.condition), (":effect", node.effect)):
+            if value is not None:
+                fields.append(self.field(word, self.timed(value), after, span))
+        parts = (_leaf(node.name), *_in_source_order(fields))
+        return Doc("(:durative-action", parts, ")", span, 1, broken=True, spaced=True)
+
+    def timed(self, node: ast.Timed) -> Doc:
+        """``(at start f)`` and the like."""
+        match node:
+            case ast.TimedFormula():
+                return Doc(f"({node.when}", (self.formula(node.formula),), ")", node.span, glued=1)
+            case ast.TimedChange():
+                return Doc(f"({node.when}", (self.effect(node.effect),), ")", node.span, glued=1)
+            case ast.TimedAll():
+                return Doc("(and", tuple(map(self.timed, node.parts)), ")", node.span)
+            case ast.TimedForall():
+                typed = self.parameters(node.parameters, node.span.start + 1, node.span)
+                return Doc("(forall", (typed, self.timed(node.part)), ")", node.span, glued=1)
+            case ast.TimedWhen():
+                parts = (self.timed(node.condition), self.timed(node.effect))
+                return Doc("(when", parts, ")", node.span, glued=1)
+            case _:
+                assert_never(node)
 
     def duration(self, node: ast.Duration) -> Doc:
         """``12``, ``(uniform 8 20)``, ``(empirical (8 0.5) (20 0.5))``."""
@@ -232,9 +264,16 @@ class _Docs:
 
     def of_dialect(
         self,
-        node: ast.StateVariable | ast.AtomList | ast.DefaultSensing | ast.Observables | ast.InitBelief,
+        node: ast.StateVariable
+        | ast.AtomList
+        | ast.DefaultSensing
+        | ast.Observables
+        | ast.InitBelief
+        | ast.DurativeAction,
     ) -> Doc:
         """The forms of other planners, such as ``(:variable (name ?x - t) value…)``."""
+        if isinstance(node, ast.DurativeAction):
+            return self.durative(node)
         if isinstance(node, ast.Observables):
             return self.listed(f"(:{node.kind}", map(self.predicate, node.declarations), node, apart=True)
         if isinstance(node, ast.InitBelief):
@@ -296,9 +335,18 @@ class _Docs:
         # A bare name has no parentheses in the source.
         around = self._parentheses(node.span.start, last, node.span) or node.name.span
         head = Doc(f"({node.name.text}", self.groups(node.parameters), ")", around, filled=True)
+        if node.range is not None:
+            return Doc("", (head, self.range(node.range, around.end, node.span)), "", node.span, filled=True)
         if not node.types:
             return head
         return Doc("", (head, self.types(node.types, around.end, node.span)), "", node.span, filled=True)
+
+    def range(self, node: ast.NumberRange, after: int, span: Span) -> Doc:
+        """``- (int low high)``."""
+        dash = self._word("-", after, span) or node.span
+        policy = () if node.policy is None else (_leaf(node.policy),)
+        kind = Doc("(int", (_number(node.low), _number(node.high), *policy), ")", node.span, glued=3)
+        return Doc("-", (kind,), "", Span(span.source, dash.start, node.span.end), glued=1)
 
     # --- problems ----------------------------------------------------------------------------
 
@@ -337,6 +385,9 @@ class _Docs:
                 return Doc("(", (), ")", node.span)
             case ast.Equality():
                 return Doc("(=", (_leaf(node.left), _leaf(node.right)), ")", node.span, glued=2)
+            case ast.Comparison():
+                numbers = (self.expression(node.left), self.expression(node.right))
+                return Doc(f"({node.operator}", numbers, ")", node.span, glued=2)
             case ast.Not():
                 return Doc("(not", (self.formula(node.part),), ")", node.span, glued=1)
             case ast.And():
@@ -489,6 +540,7 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
             tells = f":{node.observe.word}" if isinstance(node.observe, ast.SensingModel) else ":observe"
             observed = (tells, node.observe)
             repeats = (":repeats", node.repeats)
+            whole = (":uninterruptible", node.uninterruptible)
             timing = node.timing
             timed = (
                 []
@@ -505,6 +557,7 @@ def _fields(node: _Schema) -> list[tuple[str, Any]]:
                 (":precondition", node.precondition),
                 observed,
                 repeats,
+                whole,
                 (":effect", node.effect),
                 *during,
                 *timed,

@@ -133,3 +133,23 @@ class Equality:
 
 
 NumericExpression: TypeAlias = Number | FluentRef | Arithmetic
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """``(< a b)`` and its kin, of numbers: < <= = >= >."""
+
+    operator: str
+    left: NumericExpression
+    right: NumericExpression
+    span: Span = span_field()
+
+
+@dataclass(frozen=True, slots=True)
+class NumberRange:
+    """``(int low high)`` as the type of a function; ``policy`` is ``:saturate`` or ``:block``, if given."""
+
+    low: Number
+    high: Number
+    policy: Name | None
+    span: Span = span_field()

@@ -15,9 +15,9 @@ from itertools import pairwise
 from bbtc import durations
 from bbtc.belief.chain import Chain
 from bbtc.belief.draws import Values
-from bbtc.belief.state import Transition, compile_action
-from bbtc.durations import INSTANT, Bounds, Duration
-from bbtc.ground.task import ONE, Factor, GroundAction, Task
+from bbtc.belief.state import Result, Transition, compile_action, compile_parts
+from bbtc.durations import INSTANT, Bounds, Taken, UpTo
+from bbtc.ground.task import ONE, ZERO, Factor, GroundAction, Task
 from bbtc.limits import Limits
 from bbtc.markov import distribution
 
@@ -28,7 +28,7 @@ class Happening:
     if that is given), and where it leads, with probabilities that sum to 1."""
 
     chance: Fraction
-    duration: Duration
+    duration: Taken
     at_most: Fraction | None
     moves: tuple[tuple[int, Fraction], ...]
 
@@ -79,35 +79,49 @@ def happenings(task: Task, chain: Chain, limits: Limits) -> tuple[tuple[Happenin
     return tuple(found)
 
 
+def _nothing(values: Values) -> tuple[Result, ...]:
+    del values
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """Where an action may be given up: one of both, with the transition that it makes."""
+    """Where an action may be given up, or aborted: one of these, with the results of its transition, whose
+    probabilities may sum to less than 1."""
 
     chance: Fraction
-    duration: Duration
+    duration: Taken
     at_most: Fraction | None
-    transition: Transition
+    transition: Transition = _nothing
 
 
 class Doing:
     """An action in time, divided by whether it is given up."""
 
     def __init__(self, task: Task, action: GroundAction, limits: Limits) -> None:
-        if action.during is not None and task.events:
-            raise Untimed(f"{action.name} may be aborted on the way, and nobody says when")
+        self._ways: list[_Way] = []
         given_up = chance_given_up(action)
         if not given_up:
-            whole = compile_action(task, action, limits)
-            self._ways = [_Way(ONE, action.duration or INSTANT, None, whole)]
+            self._add(task, action, limits, _Way(ONE, action.duration or INSTANT, None))
             return
         if action.duration is None:
             raise Untimed(f"{action.name} does not say how long it takes where its time-out does not pass")
         assert action.timeout is not None
-        late = compile_action(task, _only(action, timed_out=True), limits)
-        self._ways = [_Way(given_up, durations.Fixed(action.timeout), None, late)]
+        late = _Way(given_up, durations.Fixed(action.timeout), None)
+        self._add(task, _only(action, timed_out=True), limits, late)
         if given_up < 1:
-            usual = compile_action(task, _only(action, timed_out=False), limits)
-            self._ways.append(_Way(1 - given_up, action.duration, action.timeout, usual))
+            usual = _Way(1 - given_up, action.duration, action.timeout)
+            self._add(task, _only(action, timed_out=False), limits, usual)
+
+    def _add(self, task: Task, action: GroundAction, limits: Limits, way: _Way) -> None:
+        """Add the action in this way; where events may abort it, some time up to its end."""
+        if action.during is None or not task.events:
+            self._ways.append(replace(way, transition=compile_action(task, action, limits)))
+            return
+        ends, aborted = compile_parts(task, action, limits)
+        sooner = way.duration if isinstance(way.duration, UpTo) else UpTo(way.duration)
+        self._ways.append(replace(way, transition=ends))
+        self._ways.append(_Way(way.chance, sooner, None, aborted))
 
     def happenings(self, chain: Chain, state: int) -> tuple[Happening, ...]:
         """The ways in which it takes time in a state of a chain that starts it."""
@@ -116,19 +130,16 @@ class Doing:
 
     def ways_from(self, values: Values, number: Mapping[Values, int]) -> tuple[Happening, ...]:
         """The ways in which it takes time in a state with these values; what it leads to is numbered."""
-        return tuple(
-            Happening(
-                way.chance,
-                way.duration,
-                way.at_most,
-                tuple(
-                    distribution(
-                        (number[result.values], result.probability) for result in way.transition(values)
-                    ).items()
-                ),
-            )
-            for way in self._ways
-        )
+        found = []
+        for way in self._ways:
+            results = way.transition(values)
+            share = sum((result.probability for result in results), ZERO)
+            if share:
+                moves = distribution(
+                    (number[result.values], result.probability / share) for result in results
+                )
+                found.append(Happening(way.chance * share, way.duration, way.at_most, tuple(moves.items())))
+        return tuple(found)
 
 
 def chance_given_up(action: GroundAction) -> Fraction:

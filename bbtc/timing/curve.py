@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from bbtc import durations
 from bbtc.belief.chain import Chain
-from bbtc.durations import Duration
+from bbtc.durations import Taken
 from bbtc.limits import Limits
 from bbtc.markov import reachable
 from bbtc.timing.chain import Happening
@@ -84,7 +84,7 @@ class _Flow:
         for probability, state in chain.initial:
             if state in useful:
                 self._start[state] += float(probability)
-        entries: dict[tuple[Duration, Fraction | None], list[tuple[int, int, float]]] = {}
+        entries: dict[tuple[Taken, Fraction | None], list[tuple[int, int, float]]] = {}
         for state, each in enumerate(ways):
             for way in each if state in useful else ():
                 rows = entries.setdefault((way.duration, way.at_most), [])

@@ -152,7 +152,7 @@ class _Writer:
                 self._done[node.id] = self.draft.cell(Cell("done", node.id, meaning, 1))
         self._note_attempts(self.root, [], ())
         self.outcomes = Outcomes(self.draft, self.start.cell_of, self.most_branches)
-        self.outcomes.prepare(actions, self.task.rounds)
+        self.outcomes.prepare(actions, self.task)
 
     def _note_attempts(self, node: Node, around: list[tuple[int, int]], tries: tuple[_Tries, ...]) -> None:
         match node:

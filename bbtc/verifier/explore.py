@@ -17,6 +17,7 @@ from bbtc.verifier.program import (
     Choose,
     Command,
     Compare,
+    Count,
     Expression,
     Increment,
     Literally,
@@ -96,12 +97,16 @@ def _compile(
 ) -> tuple[Branch, Callable[[State], State], Callable[[State], _Rewards]]:
     choosers: list[tuple[int, list[tuple[_Test, int]]]] = []
     counters: list[int] = []
+    counts: list[tuple[Count, list[tuple[_Test, bool, int]]]] = []
     for update in branch.updates:
         match update:
             case Choose(cell, cases):
                 choosers.append((cell, [(reader.compile(condition), value) for condition, value in cases]))
             case Increment(cell):
                 counters.append(cell)
+            case Count(_, _, count_cases):
+                compiled = [(reader.compile(when), kind == "add", n) for when, kind, n in count_cases]
+                counts.append((update, compiled))
             case _:
                 assert_never(update)
 
@@ -114,6 +119,11 @@ def _compile(
                     break
         for cell in counters:
             cells[cell] = state[cell] + 1
+        for update, compiled in counts:
+            for condition, adds, amount in compiled:
+                if condition(state):
+                    cells[update.cell] = update.assigned((state[update.source] if adds else 0) + amount)
+                    break
         return tuple(cells)
 
     return branch, after, _compile_rewards(reader, branch)

@@ -22,6 +22,7 @@ from bbtc.verifier.program import (
     Choose,
     Command,
     Compare,
+    Count,
     Expression,
     Increment,
     Literally,
@@ -184,6 +185,13 @@ class _Writer:
         match update:
             case Increment():
                 value = {"op": "+", "left": name, "right": 1}
+            case Count(_, _, count_cases):
+                for condition, kind, amount in reversed(count_cases):
+                    new: Json = update.assigned(amount) if kind == "assign" else self.sum(update, amount)
+                    if condition == YES:
+                        value = new
+                    else:
+                        value = {"op": "ite", "if": self.expression(condition), "then": new, "else": value}
             case Choose(_, cases):
                 for condition, number in reversed(cases):
                     if condition == YES:
@@ -193,6 +201,15 @@ class _Writer:
             case _:
                 assert_never(update)
         return {"ref": name, "value": value}
+
+    def sum(self, update: Count, amount: int) -> Json:
+        """A cell and an amount, no further than to the bounds."""
+        total: Json = self.names.cells[update.source]
+        if amount > 0:
+            total = {"op": "min", "left": {"op": "+", "left": total, "right": amount}, "right": update.most}
+        elif amount < 0:
+            total = {"op": "max", "left": {"op": "-", "left": total, "right": -amount}, "right": 0}
+        return {"op": "+", "left": total, "right": update.shift} if update.shift else total
 
     def expression(self, expression: Expression) -> Json:
         match expression:

@@ -23,12 +23,14 @@ from bbtc.ground.task import (
     Factor,
     GroundAction,
     GroundEvent,
+    NumberChange,
+    Outcome,
     Task,
     charges_of,
     effects_of,
     outcomes_of,
 )
-from bbtc.verifier.conditions import FALSE, TRUE, UNKNOWN, where_true
+from bbtc.verifier.conditions import FALSE, TRUE, UNKNOWN, Cells, where_true
 from bbtc.verifier.program import (
     NO,
     YES,
@@ -38,6 +40,7 @@ from bbtc.verifier.program import (
     Choose,
     Command,
     Compare,
+    Count,
     Drafting,
     Expression,
     Update,
@@ -52,7 +55,10 @@ MOST_BRANCHES = 64
 
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _Amounts: TypeAlias = tuple[Fraction, Fraction, Fraction]  # actions, cost, reward
-Drawn: TypeAlias = tuple[Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction]
+_Rounds: TypeAlias = tuple[tuple[GroundEvent, ...], ...]
+Drawn: TypeAlias = tuple[
+    Fraction, tuple[Effect, ...], tuple[Charge, ...], Fraction, Fraction, tuple[NumberChange, ...]
+]
 
 
 def relevant(task: Task, actions: Iterable[GroundAction], read: Iterable[int]) -> list[int]:
@@ -93,45 +99,82 @@ class Outcomes:
     commands: list[Command] = field(default_factory=list)
     stage: int | None = None
     _stages: int = 1  # 0: no action is under way; 1: the outcome is drawn, and applies now
-    _events: int = 0  # the first stage of what happens after an action
+    _events: dict[str, int] = field(
+        default_factory=dict
+    )  # by action, the first stage of what happens after it
     _pending: dict[int, int] = field(default_factory=dict)
+    _notes: dict[int, int] = field(default_factory=dict)  # those of numbers, by cell
     _entry: dict[str, int] = field(default_factory=dict)
 
-    def prepare(self, actions: Sequence[GroundAction], events: Sequence[Sequence[GroundEvent]] = ()) -> None:
-        """Write the stages of those actions that need them, and of ``events``, round by round."""
-        rounds = [[event for event in each if self._matters(event)] for each in events]
-        interrupted = [action for action in actions if action.during is not None and any(rounds)]
+    def prepare(self, actions: Sequence[GroundAction], task: Task) -> None:
+        """Write the stages of those actions that need them, and of the events of the task."""
+        meanwhile = {action.name: self._meanwhile(task, action) for action in actions}
+        moving = any(any(rounds) for rounds in meanwhile.values())
+        interrupted = [action for action in actions if action.during is not None and moving]
         staged = [
             action
             for action in actions
             if action in interrupted or combinations(action.factors) > self.most_branches
         ]
-        if not staged and not any(rounds):
+        if not staged and not moving:
             return
         self.stage = self.draft.cell(Cell("control", "stage", "stage of the outcome being drawn; 0: none", 0))
         drawn = [factor for action in staged for factor in action.possible_factors]
-        drawn += [factor for each in rounds for event in each for factor in event.factors]
+        drawn += [factor for event in task.events for factor in event.factors]
         touched = {v for effect in effects_of(drawn) for v, _ in effect.sets}
         for variable in sorted(touched & self.cell_of.keys()):
             of = self.draft.cells[self.cell_of[variable]]
+            if of.kind == "number":
+                self._pending[variable] = self._note_of(self.cell_of[variable])
+                continue
             self._pending[variable] = self.draft.cell(
                 Cell("pending", of.subject, "what it becomes: 0 as it is, 1 false, 2 unknown, 3 true", 3)
             )
-        self._events = self._happen(rounds, 0)
-        for action in staged:
+        known: dict[_Rounds, int] = {}
+        applying: dict[int, int] = {0: 1}  # by what comes next: the stage in which an outcome applies
+        for action in actions:
+            rounds = meanwhile[action.name]
             if action in interrupted:
                 self._entry[action.name] = self._happen(rounds, self._going_on(action))
-            else:
-                self._entry[action.name] = self._series(action.factors, 1)
+                continue
+            if rounds not in known:
+                known[rounds] = self._happen(rounds, 0)
+            self._events[action.name] = known[rounds]
+        for action in staged:
+            if action not in interrupted:
+                after = self._events.get(action.name, 0)
+                if after not in applying:
+                    applying[after] = self._new_stage()
+                self._entry[action.name] = self._series(action.factors, applying[after])
         highest = self._stages
         self.draft.cells[self.stage] = Cell("control", "stage", self.draft.cells[self.stage].meaning, highest)
-        self._apply(1, self._events, "the outcome applies")
+        for after, stage in applying.items():
+            self._apply(stage, after, "the outcome applies")
+
+    def _meanwhile(self, task: Task, action: GroundAction) -> _Rounds:
+        """The events that happen with an action and matter, by round."""
+        rounds = (tuple(filter(self._matters, events)) for events in task.rounds(action))
+        return tuple(events for events in rounds if events)
+
+    def _note_of(self, number: int) -> int:
+        """The pending cell of a number."""
+        if number not in self._notes:
+            of = self.draft.cells[number]
+            meaning = "what it becomes: 0 as it is, else one more than that"
+            self._notes[number] = self.draft.cell(Cell("pending", of.subject, meaning, of.highest + 1))
+        return self._notes[number]
 
     def _apply(self, stage: int, after: int, remark: str) -> None:
         """What is noted is set in one stage, then comes another."""
         assert self.stage is not None
-        apply = [applied(self.cell_of[v], p) for v, p in self._pending.items()]
-        clear = [put(pending, 0) for pending in self._pending.values()]
+        notes = {self.cell_of[variable]: pending for variable, pending in self._pending.items()}
+        apply = [
+            Count(cell, note, ((none_of(Compare(note, "=", 0)), "add", -1),), self.draft.cells[cell].highest)
+            if cell in self._notes
+            else applied(cell, note)
+            for cell, note in notes.items()
+        ]
+        clear = [put(note, 0) for note in notes.values()]
         branch = Branch(_ONE, (*apply, *clear, put(self.stage, after)), (_ZERO, _ZERO, _ZERO))
         self.commands.append(Command(None, Compare(self.stage, "=", stage), (branch,), remark))
 
@@ -150,8 +193,6 @@ class Outcomes:
         """Write the stages that draw the events, then go to the stage ``after``; the first one."""
         assert self.stage is not None
         for events in reversed(rounds):
-            if not events:
-                continue
             applies = self._new_stage()
             self._apply(applies, after, "what has happened applies")
             after = applies
@@ -197,14 +238,15 @@ class Outcomes:
             assert self.stage is not None
             rewards = (_ONE, action.cost, _ZERO)
             return (Branch(_ONE, (*updates, put(self.stage, self._entry[action.name])), rewards),)
-        if self._events:
+        if self._events.get(action.name):
             assert self.stage is not None
-            updates = (*updates, put(self.stage, self._events))
+            updates = (*updates, put(self.stage, self._events[action.name]))
         merged: dict[tuple[tuple[Update, ...], _Amounts, tuple[Charged, ...]], Fraction] = {}
-        for probability, effects, charges, cost, reward in draws(action.factors):
+        for probability, effects, charges, cost, reward, changes in draws(action.factors):
             if probability:
                 amounts = (_ONE, action.cost + cost, reward)
-                key = ((*updates, *self._set(effects)), amounts, charged(charges, self.cell_of))
+                sets = (*self._set(effects), *self._count(changes))
+                key = ((*updates, *sets), amounts, charged(charges, self.cell_of))
                 merged[key] = merged.get(key, _ZERO) + probability
         return tuple(
             Branch(p, changed, amounts, charges) for (changed, amounts, charges), p in merged.items()
@@ -223,6 +265,28 @@ class Outcomes:
                     break
             yield Choose(self.cell_of[variable], tuple(cases))
 
+    def _count(self, changes: Iterable[NumberChange]) -> Iterator[Update]:
+        """What happens to numbers."""
+        for change in changes:
+            cell = self.cell_of.get(change.digits[0])
+            if cell is not None:
+                yield self._counted(change, cell, cell, 0)
+
+    def _counted(self, change: NumberChange, cell: int, source: int, shift: int) -> Count:
+        cases = tuple(
+            (YES if case.when is None else where_true(case.when, self.cell_of), case.kind, case.amount)
+            for case in change.cases
+        )
+        return Count(cell, source, cases, self.draft.cells[source].highest, shift)
+
+    def _noted(self, outcome: Outcome) -> Iterator[Update]:
+        """Notes in *pending* cells what an outcome does."""
+        yield from noted(outcome.effects, self.cell_of, self._pending)
+        for change in outcome.changes:
+            source = self.cell_of.get(change.digits[0])
+            if source is not None:
+                yield self._counted(change, self._pending[change.digits[0]], source, 1)
+
     # --- in stages ----------------------------------------------------------------------------
 
     def _series(self, factors: Sequence[Factor], after: int) -> int:
@@ -237,7 +301,7 @@ class Outcomes:
         for outcome in factor.outcomes:
             if outcome.probability:
                 then = put(self.stage, self._series(outcome.factors, after))
-                updates = (*noted(outcome.effects, self.cell_of, self._pending), then)
+                updates = (*self._noted(outcome), then)
                 amounts = (_ZERO, outcome.cost, outcome.reward)
                 charges = charged(outcome.charges, self.cell_of)
                 branches.append(Branch(outcome.probability, updates, amounts, charges))
@@ -287,7 +351,11 @@ def _guards(effects: Sequence[Effect], cell_of: Mapping[int, int]) -> dict[int, 
     """Of each variable with a cell that is set: where it is set to false, to unknown, to true."""
     found: dict[int, list[Expression]] = {}
     for effect in effects:
-        sets = [(variable, value) for variable, value in effect.sets if variable in cell_of]
+        sets = [
+            (variable, value)
+            for variable, value in effect.sets
+            if variable in cell_of and not (isinstance(cell_of, Cells) and variable in cell_of.numbers)
+        ]
         when = where_true(effect.when, cell_of) if effect.when is not None and sets else YES
         for variable, value in sets if when != NO else ():
             guards = found.setdefault(variable, [NO, NO, NO])
@@ -304,18 +372,19 @@ def combinations(factors: Sequence[Factor]) -> int:
 
 
 def draws(factors: Sequence[Factor]) -> Iterator[Drawn]:
-    """Every combination of outcomes: probability, effects, charges, cost, reward."""
+    """Every combination of outcomes: probability, effects, charges, cost, reward, changes of numbers."""
     if not factors:
-        yield _ONE, (), (), _ZERO, _ZERO
+        yield _ONE, (), (), _ZERO, _ZERO, ()
         return
     *before, last = factors
-    for p, effects, charges, cost, reward in draws(before):
+    for p, effects, charges, cost, reward, changes in draws(before):
         for outcome in last.outcomes:
-            for p2, effects2, charges2, cost2, reward2 in draws(outcome.factors):
+            for p2, effects2, charges2, cost2, reward2, changes2 in draws(outcome.factors):
                 yield (
                     p * outcome.probability * p2,
                     (*effects, *outcome.effects, *effects2),
                     (*charges, *outcome.charges, *charges2),
                     cost + outcome.cost + cost2,
                     reward + outcome.reward + reward2,
+                    (*changes, *outcome.changes, *changes2),
                 )

@@ -272,7 +272,7 @@ class _Writer:
                     (_ZERO, cost, reward),
                     charged(charges, local),
                 )
-                for p, effects, charges, cost, reward in draws([factor])
+                for p, effects, charges, cost, reward, _ in draws([factor])
                 if p
             ]
             yield self._command(own, f"{action.name}: a factor is drawn", *branches)

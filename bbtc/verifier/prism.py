@@ -18,6 +18,7 @@ from bbtc.verifier.program import (
     Choose,
     Command,
     Compare,
+    Count,
     Expression,
     Increment,
     Literally,
@@ -137,6 +138,13 @@ class _Writer:
         match update:
             case Increment():
                 return f"({name}'={name}+1)"
+            case Count(_, source, count_cases):
+                value = name
+                for condition, kind, amount in reversed(count_cases):
+                    new = str(update.assigned(amount)) if kind == "assign" else self.sum(update, amount)
+                    value = new if condition == YES else f"{self.inner(condition)} ? {new} : {value}"
+                del source
+                return f"({name}'={value if value.isalnum() else f'({value})'})"
             case Choose(_, cases):
                 value = name
                 for condition, number in reversed(cases):
@@ -146,6 +154,16 @@ class _Writer:
                 return f"({name}'={value if value.isalnum() else f'({value})'})"
             case _:
                 assert_never(update)
+
+    def sum(self, update: Count, amount: int) -> str:
+        """A cell and an amount, no further than to the bounds."""
+        name = self.names.cells[update.source]
+        total = name if not amount else f"{name}+{amount}" if amount > 0 else f"{name}-{-amount}"
+        if amount > 0:
+            total = f"min({total}, {update.most})"
+        elif amount < 0:
+            total = f"max({total}, 0)"
+        return f"{total}+{update.shift}" if update.shift else total
 
     def expression(self, expression: Expression) -> str:
         """In PRISM ``!`` binds more tightly than ``&``, and that more than ``|``."""

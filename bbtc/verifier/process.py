@@ -23,7 +23,7 @@ def process_of(task: Task, most_branches: int = MOST_BRANCHES) -> Program:
     draft = Drafting()
     start = write_start(task, relevant(task, task.actions, read), draft)
     outcomes = Outcomes(draft, start.cell_of, most_branches)
-    outcomes.prepare(task.actions, task.rounds)
+    outcomes.prepare(task.actions, task)
     between = all_of(start.begun, outcomes.idle)
     won = draft.define("goal", "true", where_true(task.goal, start.cell_of))
     commands = []

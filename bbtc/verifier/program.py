@@ -148,7 +148,7 @@ def parts_of(expression: Expression) -> tuple[Expression, ...]:
 # --- programs --------------------------------------------------------------------------------
 
 CellKind: TypeAlias = Literal[
-    "variable", "fact", "possible", "told", "done", "attempts", "pending", "control"
+    "variable", "number", "fact", "possible", "told", "done", "attempts", "pending", "control"
 ]
 
 
@@ -192,7 +192,24 @@ class Increment:
     cell: int
 
 
-Update: TypeAlias = Choose | Increment
+@dataclass(frozen=True, slots=True)
+class Count:
+    """The cell gets what the first case that holds in the state before says: the amount, or that much more
+    than ``source``, a cell, no further than 0 and ``most``; and ``shift`` on top. Without one it keeps its
+    value."""
+
+    cell: int
+    source: int
+    cases: tuple[tuple[Expression, Literal["assign", "add"], int], ...]
+    most: int
+    shift: int = 0
+
+    def assigned(self, amount: int) -> int:
+        """What an amount that is assigned comes to."""
+        return min(max(amount, 0), self.most) + self.shift
+
+
+Update: TypeAlias = Choose | Increment | Count
 
 
 def put(cell: int, number: int) -> Choose:
@@ -290,8 +307,8 @@ class Program:
             for branch in command.branches:
                 yield from (charge.when for charge in branch.charges)
                 for update in branch.updates:
-                    if isinstance(update, Choose):
-                        yield from (condition for condition, _ in update.cases)
+                    if isinstance(update, Choose | Count):
+                        yield from (case[0] for case in update.cases)
         yield from (expression for _, expression in self.labels)
 
 

@@ -19,7 +19,7 @@ from typing_extensions import assert_never
 
 from bbtc import durations
 from bbtc.durations import Duration, Empirical, Fixed, LogNormal, Triangular, Uniform
-from bbtc.ground.task import Factor, GroundAction, Outcome, Task
+from bbtc.ground.task import Factor, GroundAction, Outcome, Task, outcomes_of
 from bbtc.limits import Limits
 from bbtc.tree.nodes import Node, actions_of
 from bbtc.verifier.chain import solvable_chain
@@ -50,6 +50,8 @@ def time_found(task: Task, root: Node, limits: Limits, seconds: Fraction | None)
     actions = [action for action in task.actions if action.name in used]
     if not all(map(_told, actions)) or (task.events and any(action.during is not None for action in actions)):
         return None
+    if task.moves_by_time and any(map(_adds, outcomes_of(f for event in task.events for f in event.factors))):
+        return None  # without what it adds, an event would have another rate
     own = recompute(explore(solvable_chain(_with_costs(task, _mean), root), limits), limits)
     if seconds is None:
         return TimeFound(own.cost, own.cost_given_success)
@@ -67,6 +69,11 @@ def time_found(task: Task, root: Node, limits: Limits, seconds: Fraction | None)
             takes[late + mark] = (Fixed(limit), None)
     by = [_success_by(space, takes, seconds, limits, late=late_too) for late_too in (True, False)]
     return TimeFound(own.cost, own.cost_given_success, (by[0], by[1]))
+
+
+def _adds(outcome: Outcome) -> bool:
+    """Does it add to cost or reward?"""
+    return bool(outcome.cost or outcome.reward or outcome.charges)
 
 
 def _told(action: GroundAction) -> bool:
@@ -155,6 +162,8 @@ def _success_by(
 def _spread(duration: Duration, at_most: Fraction | None, step: Fraction, *, late: bool) -> list[float]:
     """How probably the duration takes 0, 1, 2, … steps, rounded up, or down."""
     sure = 1.0 if at_most is None else _until(duration, at_most, inclusive=True)
+    if not sure:
+        return []  # it is always given up
     before, found = 0.0, list[float]()
     for number in range(_STEPS + 1):
         end = step * number if late else step * (number + 1)

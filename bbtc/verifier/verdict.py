@@ -79,7 +79,7 @@ def verify(tree: Tree, limits: Limits, engine: Engine = "auto", hidden: Task | N
     time: TimeFound | None = None
     if engine != "storm":
         own = recompute(explore(solvable_chain(tree.task, tree.root), limits), limits)
-        time = _time(tree, limits)
+        time = _time(tree, limits, hides=hidden is not None)
         space = None if hidden is None else space_of(hidden, tree.root, limits)
         worlds = None if space is None else recompute(space, limits)
     if engine in {"storm", "all"} or (engine == "auto" and storm.is_installed()):
@@ -89,13 +89,14 @@ def verify(tree: Tree, limits: Limits, engine: Engine = "auto", hidden: Task | N
     return Verdict(tree, own, found, problems, looked.hidden, worlds, time)
 
 
-def _time(tree: Tree, limits: Limits) -> TimeFound | None:
-    """The time that the tree takes; None where no action says how long it takes."""
+def _time(tree: Tree, limits: Limits, *, hides: bool) -> TimeFound | None:
+    """The time that the tree takes; None where no action says how long it takes. Where facts are hidden, the
+    program does not tell whether a goal that is believed is true: success in time is left out."""
     if all(action.duration is None for action in tree.task.actions):
         return None
     from bbtc.verifier.timed import time_found
 
-    seconds = None if tree.success_by is None else tree.success_by.seconds
+    seconds = None if hides or tree.success_by is None else tree.success_by.seconds
     return time_found(tree.task, tree.root, limits, seconds)
 
 

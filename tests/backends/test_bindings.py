@@ -124,9 +124,21 @@ def faults(folder: Path, bindings: str, models: str = MODELS, tree: Tree | None 
 # --- what is written -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("nodes", ["stock", "bbtc"])
-def test_every_leaf_is_a_node_of_the_package_with_its_ports(nodes: str, tmp_path: Path) -> None:
-    document = bound(tmp_path, patrol(), nodes=nodes)
+def test_our_control_nodes_do_not_hold_nodes_of_others(tmp_path: Path) -> None:
+    """They know facts by ids and ports of our leaves: a condition that an action sets would not be held."""
+    with pytest.raises(BbtcError) as raised:
+        bound(tmp_path, patrol(), nodes="bbtc")
+    (fault,) = raised.value.diagnostics
+    assert fault.code == "BBT0713"
+    actions_only = BINDINGS.partition("conditions:")[0]
+    document = bound(tmp_path, patrol(), actions_only, nodes="bbtc")
+    latched = [each[-1].tag for each in document.iter("Latch")]
+    assert latched
+    assert set(latched) <= {"NavigateToPose", "DockRobot"}
+
+
+def test_every_leaf_is_a_node_of_the_package_with_its_ports(tmp_path: Path) -> None:
+    document = bound(tmp_path, patrol())
     used: dict[str, list[dict[str, str]]] = {}
     for tree in document.iter("BehaviorTree"):
         for element in tree.iter():

@@ -60,7 +60,7 @@ def check_form(text: str) -> ET.Element:
     assert len(entries) == len(model)
     ids = [
         *trees_by_id,
-        *(name for name, entry in entries.items() if entry.tag not in ("SubTree", "Control")),
+        *(name for name, entry in entries.items() if entry.tag not in ("SubTree", "Control", "Decorator")),
     ]
     assert len({name.casefold() for name in ids}) == len(ids)
     assert not {name.casefold() for name in ids} & {name.casefold() for name in RESERVED}
@@ -84,9 +84,9 @@ def check_nodes(tree: ET.Element, entries: dict[str, ET.Element], tree_ids: set[
             model = entries.get(node.attrib["ID"])
             assert own == ({port.attrib["name"] for port in model} if model is not None else set())
             assert not any(re.match(r"[0-9.+-]", node.attrib[port]) for port in own)
-        elif node.tag in ("Skipper", "Latch"):
+        elif node.tag in ("Skipper", "Latch", "Held", "Committed"):
             assert own <= {port.attrib["name"] for port in entries[node.tag].iter("input_port")}
-            assert len(node) >= 1
+            assert len(node) == 1 if node.tag in ("Held", "Committed") else len(node) >= 1
         elif node.tag in entries:
             assert own == {port.attrib["name"] for port in entries[node.tag].iter("input_port")}
             assert len(node) == 0
@@ -121,7 +121,9 @@ def test_the_palette_has_the_leaves_and_control_nodes_alone(golden: Golden) -> N
     text = palette(soda_tree(), nodes="bbtc")
     golden("export/soda-palette.xml", text)
     (model,) = ET.fromstring(text)
-    assert [entry.tag for entry in model] == ["Condition"] * 2 + ["Action"] * 2 + ["Control"] * 2
+    assert [entry.tag for entry in model] == ["Condition"] * 2 + ["Action"] * 2 + ["Control"] * 2 + [
+        "Decorator"
+    ] * 2
     assert [entry.tag for entry in ET.fromstring(palette(soda_tree()))[0]] == ["Condition"] * 2 + [
         "Action"
     ] * 2
@@ -204,7 +206,9 @@ def test_a_namespace_comes_before_every_id_and_entry() -> None:
     named = [tree.attrib["ID"] for tree in root.iter("BehaviorTree")]
     named += [entry.attrib["ID"] for entry in root[-1]] if root[-1].tag == "TreeNodesModel" else []
     assert all(name.startswith("MyKitchen") for name in named)
-    assert set(re.findall(r"@\w+", text)) == {"@my_kitchen_acting"}
+    lasting = ("running", "ended", "held_luminousity_ok", "held_seen_soda")
+    entries = {f"@my_kitchen_look_for_soda_{word}" for word in lasting}
+    assert set(re.findall(r"@\w+", text)) == {"@my_kitchen_acting"} | entries
 
 
 @pytest.mark.parametrize("namespace", ["a b", "1a", "-", "ä", "a.b", "x" * 41, 'a"'])

@@ -16,6 +16,7 @@ from bbtc.pipeline import compile_sources, plan_task, simulate_tree
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import Tree
 from tests.backends.test_btcpp_project import assert_succeeds_as_often, built, ran
+from tests.long_form import amount
 
 HALL = """
 (define (domain hall)
@@ -35,7 +36,7 @@ HALL = """
   (:goal (and (inside) (not (broken))))
   (:goal-probability 0.5))
 """
-RUNS = 2_000
+RUNS = amount(1_000, 2_000)
 FAR = 4.5
 """Standard deviations: once in a hundred thousand runs of a right test."""
 

@@ -417,4 +417,4 @@ def test_the_length_of_a_line_does_not_count_twice(form: str) -> None:
         return time.process_time() - start
 
     seconds(100)
-    assert seconds(16_000) < 10 * seconds(4_000)
+    assert seconds(8_000) < 10 * seconds(2_000)

@@ -69,8 +69,8 @@ EDITS = {
     "unknown call": ("(goto ?place)\n", "(gotto ?place)\n", "gotto", ["gotto", "goto"]),
     "unsupported": (
         "(:action light_on",
-        "(:durative-action boil)\n  (:action light_on",
-        ":durative-action",
+        "(:process boil)\n  (:action light_on",
+        ":process",
         [],
     ),
     "two domains": ("(define (domain", "(define (domain first))\n(define (domain", "household", ["domain"]),

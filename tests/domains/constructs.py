@@ -76,6 +76,12 @@ CONSTRUCTS: dict[str, Callable[[Path], bool]] = {
     "`:observe`": _last(ast.Action, lambda node: node.observe is not None),
     "noisy `:observe`": _last(ast.Observation, lambda node: isinstance(node.content, ast.Probabilistic)),
     "`:derived`": _last(ast.Derived),
+    "`:exogenous`": _last(ast.Exogenous),
+    "`:per second`": _last(ast.Exogenous, lambda node: node.per is not None and node.per.key == "second"),
+    "`:while`": _last(ast.Action, lambda node: node.during is not None),
+    "`:duration`": _last(ast.Timing, lambda node: node.duration is not None),
+    "`:timeout`": _last(ast.Timing, lambda node: node.timeout is not None),
+    "numbers as state": _last(ast.FunctionDeclaration, lambda node: node.range is not None),
     "action costs": _last(ast.FluentEffect, lambda node: node.fluent.name.key == "total-cost"),
     "cost of one outcome": _inside(
         ast.Probabilistic, _last(ast.FluentEffect, lambda node: node.fluent.name.key == "total-cost")

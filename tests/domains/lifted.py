@@ -322,6 +322,7 @@ class Lifted:
                 bound,
                 action.get(":while"),
                 action.get(":on-abort", []),
+                action.get(":duration", "0"),
             )
             for action in self.actions
             for bound in self.bindings(typed(action.get(":parameters", [])), {})
@@ -346,9 +347,9 @@ class Lifted:
         """What an action costs on average and leads to, with what happens by itself."""
         if move.during is None:
             cost, states = alone
-            found = self.happening(states)
+            found = self.happening(states, move.takes)
             return cost + found[0] * self.counts, found[1]
-        cost, states = self.happening({state: Fraction(1)})
+        cost, states = self.happening({state: Fraction(1)}, move.takes)
         total = cost * self.counts + (0 if self.counts else 1)
         after: dict[State, Fraction] = {}
         for each, p in states.items():
@@ -361,15 +362,15 @@ class Lifted:
                     after[follower] = after.get(follower, Fraction(0)) + p * q * r
         return total, after
 
-    def happening(self, states: dict[State, Fraction]) -> Result:
-        """What events cost on average, and what they make of some states."""
+    def happening(self, states: dict[State, Fraction], takes: Form) -> Result:
+        """What events cost on average, and what they make of some states, in the time of an action."""
         total = Fraction(0)
         for events in self.rounds:
             after: dict[State, Fraction] = {}
             for state, p in states.items():
                 world, facts = self.world(state), dict(state)
                 due = [
-                    self.effect(event[":effect"], bound, world)
+                    self.effect(_in_time(event, takes), bound, world)
                     for event in events
                     for bound in self.bindings(typed(event.get(":parameters", [])), {})
                     if self.value(event.get(":precondition", []), bound, world) == 2
@@ -435,6 +436,7 @@ class Move:
     bound: Binding
     during: Form | None = None
     abort: Form = ""
+    takes: Form = "0"
     draws: dict[tuple[bool, ...], Draws] = field(default_factory=dict)
     results: dict[State, Result] = field(default_factory=dict)
 
@@ -528,6 +530,56 @@ def _together(parts: Iterable[Draws]) -> Draws:
         ]
         result = joined if len(joined) == 1 else _merged(joined)
     return result
+
+
+def _in_time(event: dict[str, Form], takes: Form) -> Form:
+    """The effect of an event in the time of an action; of one by the second, with what it comes to."""
+    if event.get(":per") != "second":
+        return event[":effect"]
+
+    def scaled(form: Form) -> Form:
+        match form:
+            case ["probabilistic", chance, effect]:
+                return ["probabilistic", str(_meanwhile(Fraction(chance), takes)), effect]
+            case ["and", *parts]:
+                return ["and", *map(scaled, parts)]
+            case ["forall", parameters, part]:
+                return ["forall", parameters, scaled(part)]
+            case ["when", condition, part]:
+                return ["when", condition, scaled(part)]
+            case _:
+                return ["probabilistic", str(_meanwhile(Fraction(1), takes)), form] if form else form
+
+    return scaled(event[":effect"])
+
+
+_PARTS = 20_000
+
+
+def _meanwhile(chance: Fraction, takes: Form) -> Fraction:
+    """How probably it happens in some time, by the midpoint rule over the quantiles of it."""
+    match takes:
+        case str(seconds):
+            times = [float(Fraction(seconds))]
+        case ["uniform", low, high]:
+            times = [float(low) + (float(high) - float(low)) * (n + 0.5) / _PARTS for n in range(_PARTS)]
+        case ["triangular", low, mode, high]:
+            times = [_triangle((n + 0.5) / _PARTS, *map(float, (low, mode, high))) for n in range(_PARTS)]
+        case ["empirical", *points]:
+            assert len({weight for _, weight in points}) == 1
+            times = [float(seconds) for seconds, _ in points]
+        case _:
+            raise ValueError(takes)
+    never = sum((1 - float(chance)) ** time for time in times) / len(times)
+    return Fraction(round((1 - never) * 10**12), 10**12)
+
+
+def _triangle(share: float, low: float, mode: float, high: float) -> float:
+    """The quantile of a triangular distribution."""
+    turn = (mode - low) / (high - low)
+    if share < turn:
+        return low + float((share * (high - low) * (mode - low)) ** 0.5)
+    return high - float(((1 - share) * (high - low) * (high - mode)) ** 0.5)
 
 
 def _contradicting(one: Draws, other: Draws) -> set[Fact]:

@@ -14,6 +14,9 @@ _ABOVE = {
 }
 _EITHER = "(either a b)"
 _CHANCES = ["0.5 {} 0.5 {}", "1/3 {} .25 {}", "0.2 {}", "1 {} 0 {}", "0.1 {} 0.2 {} 0.7 {}", "0.9 {}"]
+_RATES = ["0.3", "0.3", "1/100", "1"]
+_DURATIONS = ["2", "0", "1.5", "(uniform 1 4)", "(triangular 0 2 5)", "(empirical (1 0.5) (3 0.5))"]
+_DRAWS = re.compile(r"probabilistic|oneof")
 _AMOUNTS = ["1", "1/2", "(base)", "(+ 1 (base))", "(* 2 (+ (base) 0.5))"]
 
 Scope = dict[str, str]
@@ -293,11 +296,15 @@ class _Writer:
         listed, scope = self.parameters("?x ?y", 1)
         needs = self.among(self.condition(scope, 1, self.declared), self.atom(scope, self.fluents))
         happens = self.effect(scope, 1, priced=self.random.random() < 0.3)
+        rate = self.among("", ":per action")
+        if self.random.random() < 0.3:
+            happens, rate = self.among(self.effect(scope, 0, priced=False), happens), ":per second"
+            happens = self.effect(scope, 0, priced=False) if _DRAWS.search(happens) else happens
         fields = [
             f":parameters ({listed})",
             f":precondition {self.among(needs, needs, '()')}",
-            f":effect {self.among(happens, f'(probabilistic 0.3 {happens})')}",
-            self.among("", ":per action"),
+            f":effect {self.among(happens, f'(probabilistic {self.among(*_RATES)} {happens})')}",
+            rate,
         ]
         if before and self.random.random() < 0.8:
             fields.append(f":before {before[0] if len(before) == 1 else '(' + ' '.join(before) + ')'}")
@@ -307,7 +314,10 @@ class _Writer:
     def events(self, actions: list[str]) -> list[str]:
         """The actions, of which some go on only while something is true, and some events."""
         found = []
-        for text, scope in zip(actions, self.scopes.values(), strict=True):
+        for plain, scope in zip(actions, self.scopes.values(), strict=True):
+            text = plain
+            if self.random.random() < 0.5:
+                text = f"{plain[:-1]} :duration {self.among(*_DURATIONS)})"
             if self.random.random() < 0.6:
                 found.append(text)
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from fractions import Fraction
 
 import pytest
 
@@ -28,6 +29,7 @@ _IN_REACH = 1e-8
 _STRATEGIES = ("policy", "auto", "search", "refine")
 _LIMITS = Limits(states=3_000, nodes=60)
 _STORM_EVERY = 5
+_BY_TIME = Fraction(1, 10**7)
 
 
 def _compiled(text: str) -> tuple[Task | None, set[str]]:
@@ -59,10 +61,11 @@ def compare(seed: int) -> str:
         return "hopeless"
     found = task_value(task, Limits(), costs=True)
     assert found.lower == found.upper, text
-    assert float(found.lower) == pytest.approx(expected, abs=_IN_REACH), text
+    assert float(found.lower) == pytest.approx(expected, abs=_near(text)), text
     for steps, best in zip((1, 3), space.within(1, 3), strict=True):
         within = task_value(task, Limits(), Options(max_actions=steps))
-        assert within.lower == within.upper == best, text
+        assert within.lower == within.upper, text
+        assert _same(text, within.lower, best), text
     cost = space.least_cost()
     if cost is not None:
         assert found.cost is not None
@@ -73,6 +76,17 @@ def compare(seed: int) -> str:
     if seed % _STORM_EVERY == 0:
         _ask_others(task, found.lower)
     return _compare_tree(text, lifted, task, _STRATEGIES[seed % len(_STRATEGIES)], expected)
+
+
+def _near(text: str) -> float:
+    return float(_BY_TIME) if ":per second" in text else _IN_REACH
+
+
+def _same(text: str, one: Fraction | None, other: Fraction | None) -> bool:
+    """Exactly; but of what happens by time, the reference knows eight digits."""
+    if ":per second" not in text or one is None or other is None:
+        return one == other
+    return abs(one - other) < _BY_TIME * (1 + abs(other))
 
 
 def _ask_others(task: Task, best: object) -> None:
@@ -100,13 +114,14 @@ def _compare_tree(text: str, lifted: Lifted, task: Task, strategy: str, best: fl
     assert runs.faults == [], text
     figures = simulate_tree(tree, Limits())[0]
     claimed = (tree.success_probability, figures.failure, figures.blocked, figures.cost)
-    assert claimed == (runs.success, runs.failure, runs.blocked, runs.cost), text
-    assert runs.success <= best + _IN_REACH, text
+    found = (runs.success, runs.failure, runs.blocked, runs.cost)
+    assert all(_same(text, *both) for both in zip(claimed, found, strict=True)), text
+    assert runs.success <= best + _near(text), text
     assert verify_tree(tree, Limits(), "own").problems == (), text
     return "tree"
 
 
-@pytest.mark.parametrize("group", range(amount(2, 60)))
+@pytest.mark.parametrize("group", range(amount(1, 60)))
 def test_random_texts_with_events_have_the_values_that_their_words_give_them(group: int) -> None:
     """Best probability, within budgets too, least cost, and the runs of a tree; JSON and layout keep them."""
     done = Counter(compare(seed) for seed in range(group * _GROUP, (group + 1) * _GROUP))

@@ -54,6 +54,11 @@ def value(model: md.Model, formula: mf.Formula, binding: Binding, world: World) 
         case mf.Test(kind, atom):
             unknown = world[ground_atom(atom.predicate, atom.args, binding)] is U
             return T if unknown == (kind == "unknown") else F
+        case mf.Compare(operator, me.Constant(one), me.Constant(other)):
+            found = {"<": one < other, "<=": one <= other, "=": one == other, ">=": one >= other}
+            return T if found.get(operator, one > other if operator == ">" else one != other) else F
+        case mf.Compare():
+            raise AssertionError("numbers that change have a reference of their own")
         case mf.Equal(left, right):
             return T if binding.get(left, left) == binding.get(right, right) else F
         case mf.Not(part):
@@ -76,7 +81,7 @@ def outcomes(model: md.Model, effect: me.Effect, binding: Binding, world: World)
     match effect:
         case me.Set(predicate, args, truth):
             return {frozenset({(ground_atom(predicate, args, binding), truth)}): Fraction(1)}
-        case me.Add():
+        case me.Add() | me.Change():
             return {frozenset(): Fraction(1)}
         case me.Together(parts):
             return _together([outcomes(model, part, binding, world) for part in parts])
@@ -172,6 +177,8 @@ def may_be(
             if (kind == "unknown") == wanted:
                 return (ground, U) in reachable
             return (ground, T) in reachable or (ground, F) in reachable
+        case mf.Compare():
+            return True
         case mf.Equal(left, right):
             return (binding.get(left, left) == binding.get(right, right)) == wanted
         case mf.Not(part):
@@ -189,7 +196,7 @@ def _may_set(model: md.Model, effect: me.Effect, binding: Binding, reachable: Re
     match effect:
         case me.Set(predicate, args, truth):
             return {(ground_atom(predicate, args, binding), truth)}
-        case me.Add():
+        case me.Add() | me.Change():
             return set()
         case me.Together(parts):
             return {each for part in parts for each in _may_set(model, part, binding, reachable)}

@@ -52,6 +52,7 @@ CONDITIONS = {
         ("(exists (?x) (or (p) (r ?x)))", "(exists (?x) (or (p) (r ?x)))"),
         ("(exists (?x) (p))", "(and (p) (exists (?x) (and)))"),
     ],
+    13: [("(not (< 1 2))", "(>= 1 2)"), ("(not (and (p) (>= 2 1)))", "(or (not (p)) (< 2 1))")],
 }
 """For each rule conditions, and what becomes of them."""
 
@@ -101,6 +102,10 @@ def _condition(formula: mf.Formula) -> str:
             return _form(kind, _condition(atom))
         case mf.Equal(left, right):
             return _form("=", left, right)
+        case mf.Compare(operator, me.Constant(one), me.Constant(other)):
+            return _form(operator, str(one), str(other))
+        case mf.Compare():
+            raise AssertionError("numbers have tests of their own")
         case mf.Not(part):
             return _form("not", _condition(part))
         case mf.And(parts):
@@ -141,7 +146,7 @@ def _branches(chance: Chance) -> list[str]:
     return words
 
 
-def _leaf(leaf: me.Set | me.Add) -> str:
+def _leaf(leaf: me.Leaf) -> str:
     assert isinstance(leaf, me.Set)
     atom = _form(leaf.predicate, *leaf.args)
     return (

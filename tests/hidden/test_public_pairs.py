@@ -47,7 +47,7 @@ def _in_dialects() -> list[tuple[str, str]]:
         return []
     found = list(public_pairs.pairs(folder, DIALECTS))
     small = [pair for pair in found if sum((folder / path).stat().st_size for path in pair) < _SMALL]
-    return found if amount(0, 1) else small[::4]
+    return found if amount(0, 1) else small[::6]
 
 
 @pytest.mark.parametrize(("domain", "problem"), _in_dialects(), ids=lambda path: path.replace("/", "-"))

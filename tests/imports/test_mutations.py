@@ -23,7 +23,7 @@ from tests.replay.reference import expected_ticks
 from tests.replay.ticks import TickWorld, random_script, trace
 
 MUTANTS = amount(200, 20_000)
-RUN = amount(270, 40_000)
+RUN = amount(350, 40_000)
 """Changed files whose behaviour is compared with the engine's, if they are read."""
 
 Parents = dict[ET.Element, ET.Element]
@@ -136,8 +136,8 @@ def test_what_is_read_of_a_changed_file_is_what_the_engine_does() -> None:
         before = btcpp.export(tree, {"notes": False}, None)
         text, report = mutant(before, rng, most=2), Report()
         found = read(text, tree, report)
-        if found is None or any(doubt.code == "BBT0620" for doubt in report):
-            continue  # without its last branch it ticks for ever, which the warning says
+        if found is None or {"BBT0620", "BBT0433"} & {doubt.code for doubt in report}:
+            continue  # it ticks for ever without its last branch, or holds less, which the warning says
         try:
             replay = BtcppReplay(tree, text)
             replay.begin(TickWorld(tree.task, random_script(tree.task, rng, 1)), haltable=True)
@@ -150,8 +150,8 @@ def test_what_is_read_of_a_changed_file_is_what_the_engine_does() -> None:
         compared += 1
         different += _shape(found) != _shape(tree)
     assert not_loaded < RUN / 20
-    assert compared > RUN / 10
-    assert different > RUN / 25
+    assert compared > RUN / 15
+    assert different > RUN / 30
 
 
 def _shape(tree: Tree) -> list[str]:

@@ -18,11 +18,12 @@ import pytest
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.names import btcpp_names
 from bbtc.ground.task import ground_name
-from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing
+from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing, World
 from bbtc.tree.nodes import Tree
+from tests.replay.ticks import Tick, TickScript, TickWorld
 
 REPOSITORY = Path(__file__).parents[2]
-NODES = REPOSITORY / "bbtc" / "export" / "cpp"
+NODES = REPOSITORY / "bbtc" / "backends" / "btcpp" / "cpp"
 SOURCES = Path(__file__).parent / "cpp"
 BUILDS = REPOSITORY / "build" / "cpp"
 
@@ -165,7 +166,7 @@ class CompiledReplay:
                 self._answer("1")
         return Run(tuple(world.actions), "endless", world.values)
 
-    def _tick(self, world: ScriptedWorld) -> str:
+    def _tick(self, world: World) -> str:
         """Answer the questions of a tick; its status."""
         self._waiting = False
         assert self._process.stdout is not None
@@ -181,18 +182,40 @@ class CompiledReplay:
             except OffScript:
                 self._answer("x")
 
-    def _reply(self, world: ScriptedWorld, kind: str, rest: list[str]) -> str:
+    def _reply(self, world: World, kind: str, rest: list[str]) -> str:
         node = rest[0]
         if kind == "H":
             world.cancel(node)
             return "0"
         if kind == "G":
-            return "2" if world.go_on(node) else "1"
+            return self._acted(world, world.go_on(node))
         symbol = self._symbols[rest[1]]
         name = ground_name(symbol.name, tuple(self._objects[value] for value in rest[2:]))
         if kind == "C":
             return str(world.read(name))
-        return "2" if world.start(name, node) else "1"
+        return self._acted(world, world.start(name, node))
+
+    @staticmethod
+    def _acted(world: World, ended: bool) -> str:
+        return "1" if not ended else "2" if world.succeeds else "0"
+
+    def trace(self, script: TickScript) -> list[Tick]:
+        """What happens in every tick of a script in a new instance of the tree, until it ends."""
+        world = TickWorld(self._task, script)
+        if self._waiting:
+            self._answer("0")
+        for number in range(len(script.before)):
+            world.next_tick()
+            status = self._tick(world)
+            world.tick_ended({"0": "failure", "1": "running", "2": "success"}[status])
+            if status != "1":
+                break
+            if number in script.halts:
+                self._answer("h")
+                assert self._tick(world) == "1"
+            if number + 1 < len(script.before):
+                self._answer("1")
+        return world.ticks
 
     def _answer(self, text: str) -> None:
         assert self._process.stdin is not None

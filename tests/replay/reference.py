@@ -9,8 +9,8 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field
 
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.task import Task
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within
+from bbtc.ground.task import Factor, GroundAction, Task
 from bbtc.kleene import Truth
 from bbtc.replay.script import Run, Script, Values
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, walk
@@ -34,6 +34,10 @@ def value_of(condition: Condition, values: Values) -> str:
         if condition.value is Truth.UNKNOWN:
             return "T" if letter == "U" else "F"
         return letter if condition.value is Truth.TRUE else NOT[letter]
+    if isinstance(condition, Within):
+        digits = enumerate(condition.digits)
+        number = sum(2**place for place, digit in digits if values[digit] == 2)
+        return "T" if condition.low <= number <= condition.high else "F"
     if isinstance(condition, Not):
         return NOT[value_of(condition.part, values)]
     result, table = ("T", AND) if isinstance(condition, And) else ("F", OR)
@@ -134,11 +138,17 @@ class Ticking:
                 return STATUS[allowed]
         if any(self.tries.get(retry.id, 0) == retry.attempts for retry in self.around):
             return "failure"
+        if self.passed_by():
+            return "running"
         assert self.started is None, "a tick starts at most one action"
         self.started = node
         for retry in self.around:
             self.tries[retry.id] = self.tries.get(retry.id, 0) + 1
         return "running"
+
+    def passed_by(self) -> bool:
+        """Whether nothing starts, since the tick has passed by an action that ran."""
+        return False
 
     def started_now(self) -> ActionNode | None:
         """The action the last tick started."""
@@ -151,8 +161,12 @@ class Running(Ticking):
 
     world: TickWorld = field(kw_only=True)
     runs: ActionNode | None = None
+    ran: bool = False
+    """Whether an action was running when the tick began."""
     called: bool = False
     failed: set[str] = field(default_factory=set)
+    before: Values = ()
+    """All values in the tick that started the running action."""
 
     def act(self, node: ActionNode) -> str:
         """The status of an action node, which calls its action if it runs or may start."""
@@ -163,9 +177,13 @@ class Running(Ticking):
             return "failure"
         status = super().act(node)
         if self.started is node:
-            self._cancel()
+            assert self.runs is None
+            self.before = self.values
             self._call(node, self.world.start(node.action, node.id))
         return status
+
+    def passed_by(self) -> bool:
+        return self.ran
 
     def _call(self, node: ActionNode, ended: bool) -> None:
         self.called = True
@@ -188,14 +206,30 @@ class Running(Ticking):
         self.failed -= below
         super().forget(node)
 
+    def view(self) -> Values:
+        """What the tree reads: what the running action may set is as it was when it started."""
+        if self.runs is None:
+            return self.world.values
+        action = self.task.action_by_name[self.runs.action]
+        if action.uninterruptible:
+            return self.before
+        own = set_by(self.task, action)
+        return tuple(
+            old if variable in own else new
+            for variable, (old, new) in enumerate(zip(self.before, self.world.values, strict=True))
+        )
+
     def tick_root(self, root: Node) -> str:
         """One tick. What it does not call is cancelled; where nothing is called, nothing runs."""
-        self.values, self.called = self.world.values, False
+        self.values, self.called, self.ran = self.view(), False, self.runs is not None
         status = self.tick_all(root)
-        if not self.called:
-            self._cancel()
-            self.halt(root)
-        return "failure" if status == "running" and not self.called else status
+        if self.called:
+            return status
+        self._cancel()
+        self.halt(root)
+        if self.ran:
+            return "running"
+        return "failure" if status == "running" else status
 
     def trace(self, root: Node, script: TickScript) -> list[Tick]:
         """What happens in every tick of a script, until the tree ends."""
@@ -210,6 +244,25 @@ class Running(Ticking):
                 self.going.clear()
                 self.halt(root)
         return self.world.ticks
+
+
+def set_by(task: Task, action: GroundAction) -> set[int]:
+    """The variables that an action may set, or make known."""
+    found: set[int] = set()
+
+    def look(factors: tuple[Factor, ...], names: dict[int, int]) -> None:
+        for factor in factors:
+            for outcome in factor.outcomes:
+                for effect in outcome.effects:
+                    found.update(names[variable] for variable, _ in effect.sets if variable in names)
+                look(outcome.factors, names)
+
+    look(action.factors + action.on_abort, {number: number for number in range(len(task.variables))})
+    for change in action.changes:
+        facts = len(task.components[change.component].facts)
+        look(change.factors, {facts + at: variable for at, variable in enumerate(change.seen)})
+        found |= {knowledge.variable for knowledge in task.components[change.component].known}
+    return found
 
 
 def expected_ticks(task: Task, root: Node, script: TickScript) -> list[Tick]:

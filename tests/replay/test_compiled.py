@@ -20,6 +20,8 @@ from tests.profiles import examples
 from tests.replay.compiled import CompiledReplay, CompiledStockReplay, require_library
 from tests.replay.random_trees import random_tree
 from tests.replay.reference import random_run, varied_runs
+from tests.replay.test_ticks import scripted_trees
+from tests.replay.ticks import trace
 from tests.strategies import HOSTILE_NAMES, trees
 
 TREES = amount(60, 1000)
@@ -53,6 +55,18 @@ def test_random_trees_run_as_in_the_reference(engine: type[CompiledReplay], latc
                     assert replay.run(script, timing) == expected, (timing, script, replay.source)
                     compared += 1
     print(f"{engine.profile}: {compared} runs of {found} random trees compared")
+
+
+@PROFILES
+@pytest.mark.parametrize("endless", [False, True], ids=["ending", "endless"])
+def test_every_tick_is_as_in_the_reference(engine: type[CompiledReplay], endless: bool) -> None:
+    ticks = 0
+    for seed, (tree, scripts) in enumerate(scripted_trees(endless=endless)[:TREES]):
+        with engine(tree) as replay:
+            for script, expected in scripts:
+                assert trace(replay, script) == expected, (seed, script, replay.source)
+                ticks += len(expected)
+    print(f"{engine.profile}: {ticks} ticks of {TREES} random trees compared")
 
 
 @PROFILES

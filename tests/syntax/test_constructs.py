@@ -70,6 +70,7 @@ def action(text: str) -> ast.Action:
     return found
 
 
+ENERGY = ast.FluentRef(name("energy"), (term("?r"),), S)
 CONDITIONS: dict[str, ast.Formula] = {
     "()": ast.Empty(S),
     "( )": ast.Empty(S),
@@ -101,8 +102,12 @@ CONDITIONS: dict[str, ast.Formula] = {
     "(known ?x)": atom("known ?x"),
     "(unknown a b)": atom("unknown a b"),
     "(condition a)": atom("condition a"),
-    "(>= (energy ?r) 8)": ast.Unsupported("numeric comparison", "(>= (energy ?r) 8)", S),
-    "(= (energy ?r) 8)": ast.Unsupported("numeric comparison", "(= (energy ?r) 8)", S),
+    "(>= (energy ?r) 8)": ast.Comparison(">=", ENERGY, ast.Number("8", S), S),
+    "(= (energy ?r) 8)": ast.Comparison("=", ENERGY, ast.Number("8", S), S),
+    "(< 3 (* 2 (energy ?r)))": ast.Comparison(
+        "<", ast.Number("3", S), ast.Arithmetic("*", (ast.Number("2", S), ENERGY), S), S
+    ),
+    "(> (energy ?r) ?r)": ast.Unsupported("comparison of objects", "(> (energy ?r) ?r)", S),
     "(= (place ?r) hall)": ast.Unsupported("object fluent", "(= (place ?r) hall)", S),
     "(clear (place ?r))": ast.Unsupported("object fluent", "(clear (place ?r))", S),
     "(preference p1\n (and (q)\n r) )": ast.Unsupported("preference", "(preference p1 (and (q) r))", S),
@@ -330,8 +335,21 @@ SECTIONS: dict[str, ast.Section] = {
     "(:goal-reward 100)": ast.GoalNumber("goal-reward", number("100"), S),
     "(:metric maximize (reward))": ast.Metric("maximize", fluent("reward"), S),
     "(:metric minimize total-cost)": ast.Metric("minimize", fluent("total-cost"), S),
-    "(:durative-action go :duration (= ?duration 5))": ast.Unsupported(
-        ":durative-action", "(:durative-action go :duration (= ?duration 5))", S
+    "(:process flow :parameters () :effect (and))": ast.Unsupported(
+        ":process", "(:process flow :parameters () :effect (and))", S
+    ),
+    "(:durative-action go :duration (= ?duration 5) :condition (and (at start (p)) (over all (q))) "
+    ":effect (when (at start (p)) (at end (not (p)))))": ast.DurativeAction(
+        name("go"),
+        (),
+        number("5"),
+        ast.TimedAll(
+            (ast.TimedFormula("at start", atom("p"), S), ast.TimedFormula("over all", atom("q"), S)), S
+        ),
+        ast.TimedWhen(
+            ast.TimedFormula("at start", atom("p"), S), ast.TimedChange("at end", false("p"), S), S
+        ),
+        S,
     ),
     "(:constraints (and(always (p))))": ast.Unsupported(
         ":constraints", "(:constraints (and (always (p))))", S

@@ -274,10 +274,10 @@ PAIRS = {
 """,
     ),
     "what is refused by name is kept": (
-        "(define (domain d) (:durative-action  go\n:duration(= ?duration 5) ; long\n))",
+        "(define (domain d) (:process  go\n:precondition(= ?x 5) ; long\n))",
         """\
 (define (domain d)
-  (:durative-action go :duration (= ?duration 5) ; long
+  (:process go :precondition (= ?x 5) ; long
   ))
 """,
     ),

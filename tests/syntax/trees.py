@@ -82,13 +82,14 @@ def _formula(inner: st.SearchStrategy[object]) -> st.SearchStrategy[object]:
     )
 
 
+ENERGY = ast.FluentRef(ast.Name("energy", S), (ast.Variable("?r", S),), S)
 formulas = st.recursive(
     st.one_of(
         atoms,
         st.just(ast.Empty(S)),
         build(ast.Equality, st.one_of(objects, parameters), st.one_of(objects, parameters)),
         build(ast.Test, st.sampled_from(["unknown", "known"]), atoms),
-        st.just(ast.Unsupported("numeric comparison", "(>= (energy ?r) 8)", S)),
+        st.just(ast.Comparison(">=", ENERGY, ast.Number("8", S), S)),
         st.just(ast.Unsupported("preference", "(preference p1 (and (q) r))", S)),
     ),
     _formula,
@@ -202,7 +203,17 @@ sections = st.one_of(
     ),
     build(
         ast.Functions,
-        tuples(build(ast.FunctionDeclaration, names, typed_lists(variables), tuples(names, 0, 1))),
+        tuples(
+            st.one_of(
+                build(ast.FunctionDeclaration, names, typed_lists(variables), tuples(names, 0, 1)),
+                st.builds(
+                    lambda name, parameters, given: ast.FunctionDeclaration(name, parameters, (), S, given),
+                    names,
+                    typed_lists(variables),
+                    build(ast.NumberRange, numbers, numbers, optional(st.just(ast.Name(":block", S)))),
+                ),
+            )
+        ),
     ),
     st.builds(
         lambda *fields: ast.Action(*fields[:-1], S, fields[-1]),  # type: ignore[call-arg]

@@ -21,6 +21,7 @@ from bbtc.timing.figures import Times
 from bbtc.timing.figures import times as times_of
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree
 from bbtc.verifier.timed import time_found
+from tests.cli.program import bbtc as program
 from tests.long_form import LONG, amount
 from tests.timing.test_durations import drawn
 
@@ -370,7 +371,7 @@ def test_events_happen_after_the_time_of_an_action() -> None:
     assert found.expected == (F(8), F(8))  # two pushes of 3 s on average, then 2 s
 
 
-def test_what_may_be_aborted_on_the_way_takes_nobody_knows_how_long() -> None:
+def test_what_may_be_aborted_on_the_way_takes_from_none_to_all_of_its_time() -> None:
     tree = planned(
         "(define (domain d) (:predicates (open) (inside)) "
         "(:exogenous closes :precondition (open) :effect (probabilistic 0.5 (not (open)))) "
@@ -379,7 +380,15 @@ def test_what_may_be_aborted_on_the_way_takes_nobody_knows_how_long() -> None:
         "(define (problem p) (:domain d) (:init) (:goal (inside)) (:goal-probability 0.9))"
     )
     assert tree is not None
-    found = times(tree)
-    assert found.figures is None
-    assert "may be aborted on the way" in (found.untold or "")
+    found = times(tree).figures
+    assert found is not None
+    assert found.expected == (F(14), F(16))  # four pushes of 3 s, then 2 s; on average one is aborted of 2 s
     assert time_found(tree.task, tree.root, Limits(), F(5)) is None
+
+
+@pytest.mark.parametrize("stage", ["ast", "model", "ground"])
+def test_artefacts_of_domains_without_time_say_nothing_of_it(stage: str) -> None:
+    files = [f"domains/household/{name}.pddl" for name in ("domain", "look-for-soda")]
+    written = program("compile", "--emit", stage, *files).stdout
+    assert len(written) > 1000
+    assert not any(f'"{word}"' in written for word in ("timing", "duration", "timeout", "timed_out"))

@@ -7,7 +7,7 @@ that return RUNNING for unknown. docs/export-btcpp.md explains every idiom.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from xml.etree.ElementTree import Comment, Element, SubElement, tostring
@@ -17,11 +17,13 @@ from typing_extensions import assert_never
 from bbtc.backends.btcpp.bindings.bound import BINDINGS, bindings_of
 from bbtc.backends.btcpp.bindings.entries import Bindings
 from bbtc.backends.btcpp.conditions import ConditionWriter
+from bbtc.backends.btcpp.holding import Holding, Ports
 from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile, forgotten, full_again
 from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
 from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE, condition_below, notes, template_label
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.backends.btcpp.palette import node_model
+from bbtc.backends.commitment import Fact, facts_read, first_variable
 from bbtc.backends.exporter import Figures, Option, OptionValue
 from bbtc.backends.interface import action_symbol, guard_of, variable_symbol
 from bbtc.backends.shape import fit, written
@@ -78,7 +80,7 @@ class _Place:
     tree_title: str
     level: int = 0
     counters: tuple[str, ...] = ()
-    binding: Mapping[str, str] = field(default_factory=dict)
+    ports: Ports = field(default_factory=Ports)
     labels: Labels = field(default_factory=Labels)
     template: Node | None = None
     forget: tuple[list[str], ...] = ()
@@ -117,7 +119,12 @@ class _Writer:
         self.counters: Iterator[int] = itertools.count(1)
         self.latches: Iterator[int] = itertools.count(1)
         self.attempts: Iterator[int] = itertools.count(1)
-        self.conditions = ConditionWriter(self.task, self.names, self.tree_ids, self.idioms)
+        self.root = fit(tree.root, ENGINE)
+        self.holding = Holding(replace(tree, root=self.root), self.names, self.idioms.own)
+        if profile == "bbtc":
+            held = (variable_symbol(self.task.variables[first_variable(fact)]) for fact in self.holding.facts)
+            self.names.bound.refuse_held(held)
+        self.conditions = ConditionWriter(self.task, self.names, self.tree_ids, self.idioms, self.holding)
 
     def document(self, model: bool, with_notes: bool) -> Element:
         """The whole document."""
@@ -125,8 +132,9 @@ class _Writer:
         document = Element("root", BTCPP_format="4", main_tree_to_execute=main_id)
         main = SubElement(document, "BehaviorTree", ID=main_id)
         main.set("_description", self._headline())
-        root = fit(self.tree.root, ENGINE)
-        main.append(self.idioms.until_blocked(unwind(self._written(root, _Place(self.task.problem)))))
+        root = self.root
+        written_root = unwind(self._written(root, _Place(self.task.problem)))
+        main.append(self.idioms.until_blocked(written_root, list(self.holding.entries.values())))
         document.extend(tree for _, tree in sorted(self.parts.values(), key=lambda part: part[0]))
         document.extend(self.conditions.trees.values())
         document.extend(self.action_trees.values())
@@ -186,7 +194,7 @@ class _Writer:
             children.append((yield self._written(each, place.down())))  # noqa: PERF401
         element = self.idioms.control(node.kind, children)
         below = condition_below(self.task, node) if node.name else None
-        if below is not None and self.conditions.label(below, place.binding) == shown(node.name or ""):
+        if below is not None and self.conditions.label(below, place.ports) == shown(node.name or ""):
             return element  # with that name it would be one condition
         if node.name:
             element.set("name", shown(node.name))
@@ -199,8 +207,8 @@ class _Writer:
         hoisted = _Hoisted(next(self.order), f"{place.tree_title}Part", node.id, "")
         inside = replace(place, tree_title=hoisted.title, level=0, labels=Labels())
         content: Element = yield self._written(node, inside)
-        element = self._call(hoisted, content, tuple(place.binding.values()))
-        for port in place.binding.values():
+        element = self._call(hoisted, content, place.ports.names())
+        for port in place.ports.names():
             element.set(port, f"{{{port}}}")
         return element
 
@@ -209,13 +217,13 @@ class _Writer:
         differ in nothing else share."""
         symbol, args = split_name(template)
         hoisted = _Hoisted(next(self.order), symbol, template, f"{TEMPLATE} {shown(symbol)}")
-        binding = self._argument_ports(node, args)
-        inside = _Place(symbol, counters=place.counters, binding=binding, template=node, forget=place.forget)
+        ports = self._argument_ports(node, args)
+        inside = _Place(symbol, counters=place.counters, ports=ports, template=node, forget=place.forget)
         content: Element = yield self._written(node, inside)
-        element = self._call(hoisted, content, tuple(binding.values()))
+        ports = ports.used_in(content)
+        element = self._call(hoisted, content, ports.names())
         element.set("name", place.labels.unique(template_label(template)))
-        for arg, port in binding.items():
-            element.set(port, self.conditions.value(arg, place.binding))
+        self.conditions.give(element, ports, place.ports)
         return element
 
     def _call(self, hoisted: _Hoisted, content: Element, ports: tuple[str, ...]) -> Element:
@@ -230,58 +238,65 @@ class _Writer:
             self.subtree_ports[tree.attrib["ID"]] = ports
         return Element("SubTree", ID=self.parts[key][1].attrib["ID"])
 
-    def _argument_ports(self, root: Node, args: tuple[str, ...]) -> dict[str, str]:
-        """A port for every argument of a template that the leaves of its expansion name."""
+    def _argument_ports(self, root: Node, args: tuple[str, ...]) -> Ports:
+        """A port for every argument of a template that the leaves of its expansion name, and for every fact
+        about one that may be held."""
         uses: list[tuple[str, str]] = []
+        facts: list[Fact] = []
         for node in walk(root):
-            read: list[int] = []
+            read: Condition = TRUE
             if isinstance(node, ConditionNode):
-                read = list(variables(written(self.task, node.condition)))
+                read = written(self.task, node.condition)
             elif isinstance(node, ActionNode):
                 action = self.task.action_by_name[node.action]
                 uses += self._ports(action)
-                read = list(variables(guard_of(self.task, node) or TRUE))
-            for variable in (self.task.variables[index] for index in read):
+                read = guard_of(self.task, node) or TRUE
+                facts += self.holding.by_action.get(node.action, ())
+            facts += facts_read(self.task, read)
+            for variable in (self.task.variables[index] for index in variables(read)):
                 parameters = self.names.interface.leaves[variable_symbol(variable)].parameters
                 uses += zip(parameters, variable.args, strict=True)
         ports = ports_for((parameter, arg) for parameter, arg in uses if arg in args)
-        return {arg: ports[arg] for arg in dict.fromkeys(args) if arg in ports}
+        return self.conditions.shared(facts, {arg: ports[arg] for arg in dict.fromkeys(args) if arg in ports})
 
     def _condition(self, node: ConditionNode, place: _Place) -> Element:
         condition = written(self.task, node.condition)
         label = shown(node.name) if node.name else None
         compound = isinstance(condition, (And, Or))
         if self.conditions.uses_register(condition) or (compound and label):
-            element = self.conditions.write_apart(condition, place.binding)
-            auto = self.conditions.label(condition, place.binding)
+            element = self.conditions.write_apart(condition, place.ports)
+            auto = self.conditions.label(condition, place.ports)
             element.set("name", place.labels.unique(label or auto))
             return element
-        element = self.conditions.write(condition, place.binding)
+        element = self.conditions.write(condition, place.ports)
         if label:
             element.set("name", place.labels.unique(label) if element.tag == "SubTree" else label)
         return element
 
     def _action(self, node: ActionNode, place: _Place) -> Element:
         action = self.task.action_by_name[node.action]
-        auto = ground_name(action.schema, tuple(place.binding.get(arg, arg) for arg in action.args))
+        args, held = place.ports.args, self.holding.by_action.get(node.action, ())
+        auto = ground_name(action.schema, tuple(args.get(arg, arg) for arg in action.args))
         label = shown(node.name or auto)
         guard = guard_of(self.task, node)
-        forgets = node.latched and bool(place.forget)  # our node Latch never does
-        if self.profile == "bbtc" and not forgets:
-            tag = self._leaf(action, place.binding)
-            needed = self._start_conditions(guard, place.binding, place.counters)
-            element = self.idioms.latch(tag, needed, node.latched)
-            element.set("name", label)
-            return element
+        forgets = node.latched and bool(place.forget)
         entry = self.idioms.latch_entry(next(self.latches)) if forgets else None
         if entry is not None:
             for scripts in place.forget:
                 scripts.append(forgotten(entry))
-        tree_id = self._action_tree(node, action, guard, place.counters, entry)
+        if self.profile == "bbtc":
+            tag = self._limited(self._leaf(action, place.ports), action)
+            needed = self._start_conditions(guard, place.ports, place.counters)
+            element = self.idioms.latch(tag, needed, node.latched)
+            given = {"name": label, "entry": entry, "sets": self.holding.named(held, args)}
+            element.attrib |= {name: value for name, value in given.items() if value}
+            return element
+        tree_id, inside = self._action_tree(node, action, guard, place.counters, entry)
         element = Element("SubTree", ID=tree_id, name=place.labels.unique(label))
         for port, arg in self._ports(action):
             if port in self.subtree_ports[tree_id]:
-                element.set(port, self.conditions.value(arg, place.binding))
+                element.set(port, self.conditions.value(arg, place.ports))
+        self.conditions.give(element, Ports(facts=inside.facts), place.ports)
         return element
 
     def _action_tree(
@@ -291,48 +306,55 @@ class _Writer:
         guard: Condition | None,
         counters: tuple[str, ...],
         entry: str | None,
-    ) -> str:
-        """The id of the BehaviorTree that runs actions of a schema; ``entry`` is where one that is latched
-        for an attempt keeps how it ended."""
+    ) -> tuple[str, Ports]:
+        """The id of the BehaviorTree that runs actions of a schema, and its ports; ``entry`` is where one
+        that is latched for an attempt keeps how it ended."""
         # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
         passed = {port: arg for port, arg in self._ports(action) if not is_numeric(arg)}
-        binding = {arg: port for port, arg in reversed(passed.items())}
-        symbol, value = action_symbol(action), partial(self.conditions.value, binding=binding)
+        args = {arg: port for port, arg in reversed(passed.items())}
+        symbol, value = action_symbol(action), partial(self.conditions.value, ports=Ports(args))
         tag = self.names.bound.element(symbol, action.args, value)
         if tag is None:
             tag = Element(self.names.ids[symbol])
             for port, arg in self._ports(action):
                 tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
-        needed = self._start_conditions(guard, binding, counters)
+        tag = self._limited(tag, action)
+        held = self.holding.by_action.get(node.action, ())
+        used = [*held, *facts_read(self.task, guard or TRUE)]
+        ports = self.holding.ports(used, args)
+        needed = self._start_conditions(guard, ports, counters, held)
         title = self.names.plain[action_symbol(action)]
         often = "Again" if not node.latched else "Once" if entry is None else "OnceAnAttempt"
-        title += often + ("WhenReady" if needed else "")
+        title += often + ("WhenReady" if guard is not None or counters else "")
         if entry is not None:
             content = self.idioms.latched(tag, needed, entry)
         else:
             content = (self.idioms.latched if node.latched else self.idioms.unlatched)(tag, needed)
-        key = (title, tostring(content))
+        key, ports = (title, tostring(content)), ports.used_in(content)
         if key not in self.action_trees:
             tree_id = self.tree_ids.take(title, seed=repr(key))
             self.action_trees[key] = Element("BehaviorTree", ID=tree_id)
             self.action_trees[key].append(content)
-            self.subtree_ports[tree_id] = tuple(passed)
-        return self.action_trees[key].attrib["ID"]
+            self.subtree_ports[tree_id] = (*passed, *ports.facts.values())
+        return self.action_trees[key].attrib["ID"], ports
 
     def _start_conditions(
-        self, guard: Condition | None, binding: Mapping[str, str], counters: tuple[str, ...]
+        self, guard: Condition | None, ports: Ports, counters: tuple[str, ...], held: Sequence[Fact] = ()
     ) -> list[Element]:
-        read = None if guard is None else self.conditions.write(written(self.task, guard), binding)
-        return self.idioms.start_conditions(read, counters)
+        read = None if guard is None else self.conditions.write(written(self.task, guard), ports)
+        return self.idioms.start_conditions(read, counters, self.conditions.notes(held, ports))
 
-    def _leaf(self, action: GroundAction, binding: Mapping[str, str]) -> Element:
-        value = partial(self.conditions.value, binding=binding)
+    def _leaf(self, action: GroundAction, ports: Ports) -> Element:
+        value = partial(self.conditions.value, ports=ports)
         element = self.names.bound.element(action_symbol(action), action.args, value)
         if element is None:
             element = Element(self.names.ids[action_symbol(action)])
             for port, arg in self._ports(action):
                 element.set(port, value(arg))
         return element
+
+    def _limited(self, leaf: Element, action: GroundAction) -> Element:
+        return leaf if action.timeout is None else self.idioms.given_up(leaf, action.timeout)
 
     def _ports(self, action: GroundAction) -> list[tuple[str, str]]:
         parameters = self.names.interface.leaves[action_symbol(action)].parameters

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Literal, TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
@@ -18,10 +19,11 @@ from bbtc.tree.nodes import ControlKind
 
 Profile: TypeAlias = Literal["stock", "bbtc"]
 
-SKIPPER, LATCH = "Skipper", "Latch"
-"""Ids of our own control nodes."""
+SKIPPER, LATCH, HELD, COMMITTED = "Skipper", "Latch", "Held", "Committed"
+"""Ids of our own nodes: two control nodes, and what stands around leaves and around the tree."""
 
 UNTIL_SUCCESS = "RetryUntilSuccessful"
+TIMEOUT = "Timeout"
 
 SKIPPER_LABEL = "skipper"
 """The name that a Parallel gets where the Skipper has none."""
@@ -29,6 +31,7 @@ SKIPPER_LABEL = "skipper"
 _RETRY_LABEL = re.compile("at most [0-9]+ attempts?")
 
 BLOCKED_LABEL = "until blocked"
+HOLD_LABEL = "hold what it may set"
 WHEN_READY_LABEL = "start when ready"
 
 
@@ -43,8 +46,13 @@ class Idioms:
 
     @property
     def acting(self) -> str:
-        """The entry that tells whether the tick has reached a running action."""
+        """The entry that tells whether an action ran when the tick began, or runs by now."""
         return f"{self.prefix}acting"
+
+    @property
+    def running(self) -> str:
+        """The entry that tells whether an action runs."""
+        return f"@{self.own}running"
 
     def counter(self, number: int) -> str:
         """The entry that counts the attempts a retry node has left."""
@@ -110,10 +118,26 @@ class Idioms:
         done.set("_onFailure", f"{state} := 'new'")
         return self.control("sequence", [once, retry, done])
 
-    def until_blocked(self, root: Element) -> Element:
+    def until_blocked(self, root: Element, entries: Sequence[str]) -> Element:
         """The tree, and FAILURE as soon as it is running while no action is: nothing can change
-        then, and a loop that ticks while RUNNING would never end."""
-        ticked = self.control("sequence", [Element("Script", code=f"@{self.acting} := false"), root])
+        then, and a loop that ticks while RUNNING would never end. A tick that passes by an action that
+        ran is RUNNING. While none runs, the facts of these entries are read as they are."""
+        if self.profile == "bbtc":
+            return decorated(COMMITTED, root)
+        once = Element("RunOnce", then_skip="false")
+        SubElement(once, "Script", code=f"{self.running} := false")
+        first = [once]
+        if entries:
+            live = Element("Precondition", {"if": f"!{self.running}", "else": "SUCCESS"})
+            SubElement(live, "Script", code="; ".join(f"{entry} := 'live'" for entry in entries))
+            first.append(live)
+        ended = f"@{self.own}ended"
+        root.set("_onSuccess", f"{ended} := 'success'")
+        root.set("_onFailure", f"{ended} := 'failure'")
+        told = Element("Precondition", {"if": f"!@{self.acting}", "else": "RUNNING"})
+        SubElement(told, "ScriptCondition", code=f"{ended} == 'success'")
+        script = Element("Script", code=f"@{self.acting} := {self.running}")
+        ticked = self.control("sequence", [*first, script, decorated("ForceSuccess", root), told])
         blocked = Element("Precondition", {"if": f"!@{self.acting}", "else": "RUNNING"})
         SubElement(blocked, "AlwaysFailure", name="blocked: nothing can observe what is unknown")
         outer = self.control("skipper", [ticked, blocked])
@@ -122,13 +146,25 @@ class Idioms:
 
     # --- actions -----------------------------------------------------------------------------
 
-    def start_conditions(self, guard: Element | None, counters: Sequence[str]) -> list[Element]:
-        """What must succeed, in this order, before an action starts: its guard, and an attempt left of
-        every retry node around it, which is then used up."""
+    def start_conditions(
+        self, guard: Element | None, counters: Sequence[str], notes: Sequence[Element] = ()
+    ) -> list[Element]:
+        """What must succeed, in this order, before an action starts: its guard; an attempt left of every
+        retry node around it; that no action ran when the tick began; then the attempt is used up, and notes
+        are made of what the action may set. Our own nodes do the third and the last."""
         needed = [] if guard is None else [guard]
         if counters:
             needed.append(Element("ScriptCondition", code=" && ".join(f"{c} > 0" for c in counters)))
+        if self.profile == "stock":
+            free = Element("Precondition", {"if": f"!@{self.acting}", "else": "RUNNING"})
+            SubElement(free, "AlwaysSuccess")
+            # All of it in each tick, until it succeeds.
+            needed = [self.control("sequence", [*needed, free]) if needed else free]
+        if counters:
             needed.append(Element("Script", code="; ".join(f"{c} -= 1" for c in counters)))
+        if notes:
+            needed.append(self.control("sequence", notes))
+            needed[-1].set("name", HOLD_LABEL)
         return needed
 
     def latch(self, action: Element, needed: Sequence[Element], latched: bool) -> Element:
@@ -136,8 +172,6 @@ class Idioms:
         element = _around(LATCH, [*needed, action])
         if not latched:
             element.set("keep", "false")
-        if self.prefix:
-            element.set("flag", self.acting)
         return element
 
     def latched(self, action: Element, needed: Sequence[Element], entry: str = "_latch") -> Element:
@@ -146,25 +180,18 @@ class Idioms:
         latch = Element("Switch2", variable=f"{{{entry}}}", case_1="success", case_2="failure")
         SubElement(latch, "AlwaysSuccess")
         SubElement(latch, "AlwaysFailure")
-        action.set("_onSuccess", f"{entry} := 'success'")
-        action.set("_onFailure", f"{entry} := 'failure'")
-        action.set("_onHalted", f"{entry} := 'success'")
-        running = self._running(action, f"@{self.acting} := true")
-        if needed:
-            # With memory: once the action runs, its own effect may end its precondition.
-            started = SubElement(latch, "Sequence", name=WHEN_READY_LABEL)
-            started.extend([*needed, running])
-        else:
-            latch.append(running)
+        for event, status in (("_onSuccess", "success"), ("_onFailure", "failure"), ("_onHalted", "success")):
+            action.set(event, f"{entry} := '{status}'; {self.running} := false")
+        # With memory: once the action runs, its own effect may end its precondition.
+        started = SubElement(latch, "Sequence", name=WHEN_READY_LABEL)
+        started.extend([*needed, self._running(action, "")])
         return latch
 
     def unlatched(self, action: Element, needed: Sequence[Element]) -> Element:
         """Runs the action whenever it is ticked, again and again."""
-        if not needed:
-            return self._running(action, f"@{self.acting} := true")
         for event in ("_onSuccess", "_onFailure", "_onHalted"):
-            action.set(event, "_started := 'no'")
-        running = self._running(action, f"@{self.acting} := true; _started := 'yes'")
+            action.set(event, f"_started := 'no'; {self.running} := false")
+        running = self._running(action, "; _started := 'yes'")
         ready = Element("Switch2", variable="{_started}", case_1="yes", case_2="never")
         SubElement(ready, "AlwaysSuccess")
         SubElement(ready, "AlwaysFailure")
@@ -172,9 +199,35 @@ class Idioms:
         running.insert(0, ready)
         return running
 
-    def _running(self, action: Element, script: str) -> Element:
+    def _running(self, action: Element, more: str) -> Element:
+        script = f"@{self.acting} := true; {self.running} := true{more}"
         keep = decorated("KeepRunningUntilFailure", decorated("ForceSuccess", action))
         return self.control("sequence", [Element("Script", code=script), keep])
+
+    # --- what is held ------------------------------------------------------------------------
+
+    def held(self, leaf: Element, entry: str) -> Element:
+        """What a condition reads: what its entry (as the value of a port) says, unless that is ``live``."""
+        if self.profile == "bbtc":
+            return decorated(HELD, leaf)
+        element = Element("Switch3", variable=entry, case_1="true", case_2="false", case_3="unknown")
+        for tag in ("AlwaysSuccess", "AlwaysFailure"):
+            SubElement(element, tag)
+        element.extend([self.control("skipper", []), leaf])
+        return element
+
+    def note(self, leaf: Element, entry: str) -> Element:
+        """Writes what a condition reads to an entry (by its name in a script)."""
+        leaf.set("_onSuccess", f"{entry} := 'true'")
+        leaf.set("_onFailure", f"{entry} := 'false'")
+        unknown = Element("Script", code=f"{entry} := 'unknown'")
+        return decorated("ForceSuccess", self.control("skipper", [leaf, unknown]))
+
+    def given_up(self, leaf: Element, seconds: Fraction) -> Element:
+        """The action, which has ended when it is given up after so many seconds, as it has when it fails."""
+        limit = decorated(TIMEOUT, leaf)
+        limit.set("msec", str(milliseconds(seconds)))
+        return decorated("ForceSuccess", limit)
 
     # --- tests and registers -----------------------------------------------------------------
 
@@ -194,6 +247,11 @@ class Idioms:
         answer = Element("Precondition", {"if": "_value != 'unknown'", "else": "RUNNING"})
         SubElement(answer, "ScriptCondition", code="_value == 'true'")
         return self.control("sequence", [read, answer])
+
+
+def milliseconds(seconds: Fraction) -> int:
+    """The next whole number of them."""
+    return -int(-seconds * 1000 // 1)
 
 
 def attempt_ends(state: str, forget: Sequence[str]) -> dict[str, str]:

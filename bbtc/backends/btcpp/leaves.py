@@ -160,6 +160,46 @@ class NAME : public BT::ConditionNode {
 };
 """
 
+_NUMBER = """\
+class NAME : public BT::ConditionNode {
+ public:
+  NAME(const std::string& name, const BT::NodeConfig& config, Robot* robot)
+      : BT::ConditionNode(name, config), robot_(robot) {}
+
+  static BT::PortsList providedPorts() { return PORTS; }
+
+ private:
+  BT::NodeStatus tick() override { return between(*this, robot_->METHOD(ARGUMENTS)); }
+
+  Robot* robot_;
+};
+"""
+
+_BETWEEN = """\
+/// The value of a port that holds a whole number; nothing where it is not given.
+inline std::optional<int> bound(const BT::TreeNode& node, const std::string& port) {
+  if (node.config().input_ports.count(port) == 0) {
+    return std::nullopt;
+  }
+  const auto value = node.getInput<int>(port);
+  if (!value) {
+    throw BT::RuntimeError(node.name(), ": ", value.error());
+  }
+  return value.value();
+}
+
+/// Whether a number is no less than the port at_least and no more than at_most; RUNNING where it is unknown.
+inline BT::NodeStatus between(const BT::TreeNode& node, std::optional<int> value) {
+  if (!value) {
+    return BT::NodeStatus::RUNNING;
+  }
+  const std::optional<int> least = bound(node, "at_least");
+  const std::optional<int> most = bound(node, "at_most");
+  const bool inside = (!least || *least <= *value) && (!most || *value <= *most);
+  return inside ? BT::NodeStatus::SUCCESS : BT::NodeStatus::FAILURE;
+}
+"""
+
 _ACTION = """\
 class NAME : public BT::StatefulActionNode {
  public:
@@ -306,7 +346,8 @@ class LeafWriter:
 
     def method(self, leaf: Leaf) -> str:
         """``isSeen``, ``doDetect``."""
-        return f"{'do' if leaf.symbol.kind == 'action' else 'is'}{self._names.plain[leaf.symbol]}"
+        verb = "do" if leaf.symbol.kind == "action" else "get" if leaf.counts else "is"
+        return f"{verb}{self._names.plain[leaf.symbol]}"
 
     def cancel(self, leaf: Leaf) -> str:
         """``cancelDetect``."""
@@ -318,6 +359,8 @@ class LeafWriter:
             result = "void"
         elif leaf.symbol.kind == "action":
             result = "BT::NodeStatus"
+        elif leaf.counts:
+            result = "std::optional<int>"
         else:
             result = "std::optional<bool>" if leaf.three_valued else "bool"
         listed = [p if named else f"/*{p}*/" for p in cppcode.parameters(leaf.parameters)]
@@ -343,6 +386,9 @@ class LeafWriter:
                 lines += ["", f"  /// Start or continue {said}."]
                 lines += [f"  virtual {self.declaration(leaf, self.method(leaf))} = 0;"]
                 lines += [f"  virtual {self.declaration(leaf, self.cancel(leaf), named=False)} {{}}"]
+            elif leaf.counts:
+                lines += ["", f"  /// The value of {said}; nothing where that is unknown."]
+                lines += [f"  virtual {self.declaration(leaf, self.method(leaf))} = 0;"]
             else:
                 unknown = "; nothing where that is unknown" if leaf.three_valued else ""
                 lines += ["", f"  /// Whether {said} holds{unknown}."]
@@ -379,7 +425,9 @@ class LeafWriter:
         head = _LEAVES if self._monitor is None else _LEAVES.replace(ACCESS, MONITOR_ACCESS)
         if self._program.our_nodes:
             head = head.replace('#include "robot.hpp"', '#include "bbtc_nodes.hpp"\n#include "robot.hpp"')
-        blocks = [cppcode.fill(head, **words), *(self._class(leaf) for leaf in self.leaves())]
+        blocks = [cppcode.fill(head, **words)]
+        blocks += [_BETWEEN] if any(leaf.counts for leaf in self.leaves()) else []
+        blocks += [self._class(leaf) for leaf in self.leaves()]
         body = [
             f"  factory.registerNodeType<{self.class_name(leaf)}>"
             f"({cppcode.literal(self._names.ids[leaf.symbol])}, robot);"
@@ -410,7 +458,8 @@ class LeafWriter:
                 declared = self.declaration(leaf, self.method(leaf))
             else:
                 # Else a tree whose guards it blocks would end without a word.
-                said, answer = ("unknown", "std::nullopt") if leaf.three_valued else ("false", "false")
+                open_ = leaf.three_valued or leaf.counts
+                said, answer = ("unknown", "std::nullopt") if open_ else ("false", "false")
                 words = [cppcode.literal(self.method(leaf))]
                 words += (f"' ', {parameter}" for parameter in cppcode.parameters(leaf.parameters))
                 words.append(cppcode.literal(f", {said} until then"))
@@ -421,7 +470,7 @@ class LeafWriter:
 
     def _class(self, leaf: Leaf) -> str:
         told = f"/// {cppcode.comment(signature(leaf))}\n"
-        text = _ACTION if leaf.symbol.kind == "action" else _CONDITION
+        text = _ACTION if leaf.symbol.kind == "action" else _NUMBER if leaf.counts else _CONDITION
         more: dict[str, str] = {}
         if self._monitor is not None:
             text, more = self._with_monitor(leaf)

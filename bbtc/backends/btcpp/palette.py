@@ -10,11 +10,11 @@ from xml.etree.ElementTree import Element, SubElement
 
 from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.bindings.bound import BINDINGS, bindings_of
-from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, Profile
+from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, Profile
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
 from bbtc.backends.exporter import Figures, Option, OptionValue
-from bbtc.backends.interface import Leaf, variable_symbol
+from bbtc.backends.interface import BOUNDS, Leaf, variable_symbol
 from bbtc.ground.task import Task
 from bbtc.printable import printable
 from bbtc.tree.nodes import Tree
@@ -55,6 +55,10 @@ def meaning(leaf: Leaf) -> str:
     """What a leaf tells or does, in a sentence."""
     if leaf.symbol.kind == "action":
         return f"Does {signature(leaf)}."
+    if leaf.counts:
+        least, most = BOUNDS
+        compared = f"is no less than {least} and no more than {most}, as far as these are given"
+        return f"SUCCESS where {signature(leaf)} {compared}, else FAILURE; RUNNING where it is unknown."
     unknown = ", RUNNING where it is unknown" if leaf.three_valued else ""
     return f"SUCCESS where {signature(leaf)} is true, FAILURE where it is false{unknown}."
 
@@ -69,7 +73,14 @@ def _entry(
     element = SubElement(model, kind, ID=names.ids[leaf.symbol])
     for port, text in zip(leaf.parameters, _port_text(names, objects, leaf), strict=True):
         SubElement(element, "input_port", name=port, type="std::string").text = text or None
+    for port, text in _bounds(leaf):
+        SubElement(element, "input_port", name=port, type="int").text = text
     SubElement(element, "description").text = meaning(leaf)
+
+
+def _bounds(leaf: Leaf) -> list[tuple[str, str]]:
+    """What a number is compared with, and what is said of that."""
+    return [(BOUNDS[0], "the least value"), (BOUNDS[1], "the greatest value")] if leaf.counts else []
 
 
 def port_code(task: Task, names: BtcppNames, leaf: Leaf) -> str:
@@ -77,6 +88,10 @@ def port_code(task: Task, names: BtcppNames, leaf: Leaf) -> str:
     ports = [
         f"BT::InputPort<std::string>({cppcode.literal(port)}, {cppcode.literal(text)})"
         for port, text in zip(leaf.parameters, _port_text(names, _objects(task), leaf), strict=True)
+    ]
+    ports += [
+        f"BT::InputPort<int>({cppcode.literal(port)}, {cppcode.literal(text)})"
+        for port, text in _bounds(leaf)
     ]
     return f"{{{', '.join(ports)}}}"
 
@@ -115,9 +130,24 @@ def _our_nodes(model: Element) -> None:
     keep.text = "whether the action runs once and its status is kept"
     flag = SubElement(latch, "input_port", name="flag", type="std::string", default="acting")
     flag.text = "entry of the root blackboard that is set to true while the action runs"
+    entry = SubElement(latch, "input_port", name="entry", type="std::string", default="")
+    entry.text = "entry of the blackboard that its status is kept in"
+    sets = SubElement(latch, "input_port", name="sets", type="std::string", default="")
+    sets.text = "the facts that are held while the action runs"
     SubElement(latch, "description").text = (
         "Runs the action that is its last child, once the children before it have succeeded; its "
         "status counts from the next tick on."
+    )
+    held = SubElement(model, "Decorator", ID=HELD)
+    SubElement(
+        held, "description"
+    ).text = (
+        "What the condition returned before the running action began, if that sets it; or what it returns."
+    )
+    committed = SubElement(model, "Decorator", ID=COMMITTED)
+    SubElement(committed, "description").text = (
+        "The root: knows which action runs, is RUNNING where the tick passes that by, and fails where the "
+        "tree is RUNNING but no action is."
     )
 
 

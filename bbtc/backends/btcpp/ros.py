@@ -22,6 +22,7 @@ from bbtc.backends.btcpp.ros_monitor import (
 from bbtc.backends.exporter import Begun
 from bbtc.backends.interface import Leaf, action_symbol
 from bbtc.backends.names import Symbol, interface_header
+from bbtc.diagnostics import BbtcError
 from bbtc.ground.task import Task
 from bbtc.tree.monitor import FIRST
 from bbtc.tree.nodes import Tree
@@ -64,6 +65,13 @@ class _RosWriter:
     def __init__(
         self, tree: Tree, names: BtcppNames, program: Program, services: bool, bound: BoundWriter
     ) -> None:
+        counted = next((leaf for leaf in names.interface.conditions if leaf.counts), None)
+        if counted is not None:
+            raise BbtcError.single(
+                "BBT0441",
+                f"the ROS 2 package does not know numbers, such as {signature(counted)}",
+                hint="with `-O leaves=cpp` the robot is a class that is asked for them",
+            )
         self._task: Task = tree.task
         self._monitor = tree.monitor
         self._names = names

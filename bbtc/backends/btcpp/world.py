@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from typing_extensions import assert_never
 
 from bbtc.backends.btcpp import cppcode
@@ -11,8 +13,8 @@ from bbtc.backends.btcpp.names import BtcppNames
 from bbtc.backends.interface import Leaf, action_symbol, variable_symbol
 from bbtc.backends.shape import normal
 from bbtc.backends.world_model import actions_used, changes_of, initial_values, relevant_variables
-from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or
-from bbtc.ground.task import Factor, Outcome
+from bbtc.ground.condition import TRUE, And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
+from bbtc.ground.task import Factor, GroundEvent, Outcome, Variable
 from bbtc.kleene import Truth
 from bbtc.tree.monitor import Monitor, Telling, Walk
 from bbtc.tree.nodes import Tree
@@ -92,7 +94,7 @@ class SimulatedRobotWriter:
 
     def _model(self) -> str:
         variables = [self._task.variables[index] for index in self._relevant]
-        facts = [cppcode.literal(key_of(self._names, variable_symbol(v), v.args)) for v in variables]
+        facts = [cppcode.literal(self._key(variable)) for variable in variables]
         starts = initial_values(self._task, self._relevant)
         initial = [
             braces([f"{weight}u", braces(_VALUES[value] for value in values)])
@@ -118,16 +120,16 @@ class SimulatedRobotWriter:
 
     def _moves(self) -> str:
         """What happens by itself, and which actions that may end."""
-        rounds = [
-            _rows(
-                [
-                    f"Event{{{self._anywhere(normal(self._task, event.precondition))}, "
-                    f"{self._factors(event.factors)}}}"
-                    for event in events
-                ]
-            )
-            for events in self._task.rounds
-        ]
+        tables: dict[tuple[tuple[GroundEvent, ...], ...], str] = {}
+        lines: list[str] = []
+        events: list[str] = []
+        for action in actions_used(self._tree):
+            rounds = self._task.rounds(action)
+            if rounds not in tables:
+                tables[rounds] = f"moves{len(tables) + 1}"
+                lines += [f"  static const Rounds {tables[rounds]} =", f"      {self._rounds(rounds)};"]
+            key = cppcode.literal(key_of(self._names, action_symbol(action), action.args))
+            events.append(f"{{{key}, {tables[rounds]}}}")
         interrupted = [
             f"{{{cppcode.literal(key_of(self._names, action_symbol(action), action.args))},\n"
             f"           Interruption{{{self._lambda(normal(self._task, action.during))}, "
@@ -138,8 +140,9 @@ class SimulatedRobotWriter:
         return "\n".join(
             [
                 "inline const Moves& moves() {",
+                *lines,
                 "  static const Moves all = {",
-                f"      /*rounds=*/{_rows(rounds)},",
+                f"      /*events=*/{_rows(events)},",
                 f"      /*interrupted=*/{_rows(interrupted)}}};",
                 "  return all;",
                 "}",
@@ -199,6 +202,20 @@ class SimulatedRobotWriter:
         items = [cppcode.literal(telling.name), f"{right}u", f"{wrong}u"]
         return f"Telling{braces([*items, self._lambda(observation.condition), when])}"
 
+    def _rounds(self, rounds: Sequence[Sequence[GroundEvent]]) -> str:
+        return _rows(
+            [
+                _rows(
+                    [
+                        f"Event{{{self._anywhere(normal(self._task, event.precondition))}, "
+                        f"{self._factors(event.factors)}}}"
+                        for event in events
+                    ]
+                )
+                for events in rounds
+            ]
+        )
+
     def _anywhere(self, condition: Condition) -> str:
         return "nullptr" if condition == TRUE else self._lambda(condition)
 
@@ -237,6 +254,8 @@ class SimulatedRobotWriter:
                 return f"is_unknown(s[{self._number[variable]}])"
             case Known(variable):
                 return f"is_known(s[{self._number[variable]}])"
+            case Within():
+                return self._test(in_digits(condition))
             case And(parts):
                 return f"all_of({braces(map(self._test, parts))})"
             case Or(parts):
@@ -245,6 +264,28 @@ class SimulatedRobotWriter:
                 return f"negated({self._test(part)})"
             case _:
                 assert_never(condition)
+
+    def _key(self, variable: Variable) -> str:
+        """What a fact is called in the world. Numbers are kept there digit by digit."""
+        if variable.digit is None:
+            return key_of(self._names, variable_symbol(variable), variable.args)
+        values = ",".join(self._names.values[arg] for arg in variable.args)
+        return f"{variable.predicate}({values})"
+
+    def _number_code(self, leaf: Leaf, arguments: list[str]) -> str:
+        """C++ that puts a number together of its digits."""
+        number = next(
+            each
+            for each in self._task.numbers
+            if (each.function, len(each.args)) == (leaf.symbol.name, leaf.symbol.arity)
+        )
+        parts = [str(number.low)]
+        for place, digit in enumerate(number.digits):
+            inner = ' + "," + '.join(arguments)
+            head = cppcode.literal(f"{self._task.variables[digit].predicate}({'' if arguments else ')'}")
+            key = f'std::string({head}) + {inner} + ")"' if arguments else head
+            parts.append(f"(world_.read({key}).value() ? {1 << place} : 0)")
+        return " + ".join(parts)
 
     # --- the robot ---------------------------------------------------------------------------
 
@@ -255,6 +296,8 @@ class SimulatedRobotWriter:
         if leaf.symbol.kind == "predicate":
             value = f"world_.read({key})" if leaf.three_valued else f"world_.read({key}).value()"
             return f"\n  {declared} override {{ return {value}; }}"
+        if leaf.counts:
+            return f"\n  {declared} override {{ return {self._number_code(leaf, list(names))}; }}"
         cancel = self._leaves.declaration(leaf, self._leaves.cancel(leaf))
         return (
             f"\n  {declared} override {{ return world_.act({key}); }}"

@@ -108,7 +108,7 @@ def readable_names(program: Program) -> Names:
 
 def _cell(cell: Cell) -> str:
     match cell.kind:
-        case "variable" | "control":
+        case "variable" | "number" | "control":
             return snake(cell.subject)
         case "done" | "attempts" | "possible" | "told":
             return f"{cell.kind}_{snake(cell.subject)}"

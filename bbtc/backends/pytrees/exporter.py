@@ -7,24 +7,25 @@ from :mod:`bbtc.runtime`), the tree, and a simulated world to run it in.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from typing_extensions import assert_never
 
+from bbtc.backends.commitment import Fact, first_variable, held_by
 from bbtc.backends.exporter import Figures, Option, OptionValue
 from bbtc.backends.interface import Interface, action_symbol, guard_of, interface_of, variable_symbol
 from bbtc.backends.names import PYTHON_RESERVED, Symbol, identifiers
 from bbtc.backends.pytrees.parts import (
-    CONDITION_TYPE,
     ConditionCode,
     action_summary,
     condition_summary,
+    condition_type,
     fact_tuple,
     harmless,
     method,
     words_tuple,
 )
-from bbtc.backends.pytrees.pycode import Code, Group, Prefixed, call, layout, literal, mapping
+from bbtc.backends.pytrees.pycode import Code, Group, Prefixed, call, layout, literal, mapping, sequence
 from bbtc.backends.pytrees.runtime import RUNTIME, copied, defined, imports, needed, used_in
 from bbtc.backends.pytrees.world import WorldWriter
 from bbtc.backends.shape import fit, normal, words_of
@@ -88,8 +89,9 @@ class _Writer:
         self.claim = tree.success_probability
         self.root = fit(tree.root, "py_trees")
         self.names = py_trees_names(tree)
-        self.conditions = ConditionCode()
+        self.conditions = ConditionCode(tree.task.variables)
         self.world = WorldWriter(tree, self.names.interface, self.names.methods, self.conditions)
+        self.held = held_by(replace(tree, root=self.root))
         self.branches: list[list[str]] = []
         retries = [node for node, _ in retries_of(self.root)]
         self.tried = {action.id for node in retries for action in actions_of(node)}
@@ -98,17 +100,19 @@ class _Writer:
         """The source text."""
         root_kind = "StopWhenBlocked" if self.monitor is None else "StopOutside"
         body = layout(call(root_kind, "robot", self._code(self.root, 1), "READS"), "return ", level=1)
-        root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *body]
+        view = ["    robot = view(robot)"] if self.held else []
+        root = ["def create_root(robot: Robot) -> Behaviour:", *_CREATE_ROOT.splitlines(), *view, *body]
         trees, main = [*self.branches, root], self._main().splitlines()
-        tables = [self._reads(), *self.world.tables()]
+        tables = [self._reads(), *self._own(), *self.world.tables()]
         # Without the methods of the robots, whose parameters may be named like anything.
         used = {"Fact", "Protocol", "Status", "run"}
         used |= {self.world.base} if self.monitor is None else {"HiddenWorld", "Monitor", "Part"}
         used |= used_in(line for block in [*trees, *tables, main] for line in block)
         if self.embedded:
             used = needed(used)
-            nodes, world, head = copied("nodes", used), copied("world", used), imports(used)
-            world += [*copied("monitor", used), *copied("moving", used)]
+            nodes = [*copied("nodes", used), *copied("limits", used)]
+            world, head = copied("world", used), imports(used)
+            world += [*copied("monitor", used), *copied("moving", used), *copied("numbers", used)]
         else:
             nodes, world, head = [], [], imports(used, ("bbtc.runtime", defined(used)))
             head += ["", _PUBLIC if self.monitor is None else _PUBLIC_HIDDEN]
@@ -141,20 +145,36 @@ class _Writer:
         methods = self.names.methods
         lines = (_PROTOCOL if self.monitor is None else _PROTOCOL_HIDDEN).splitlines()
         for leaf in self.names.interface.asked:
-            lines += method(methods[leaf.symbol], leaf, CONDITION_TYPE, condition_summary(leaf))
+            lines += method(methods[leaf.symbol], leaf, condition_type(leaf), condition_summary(leaf))
         for leaf in self.names.interface.actions:
             lines += method(methods[leaf.symbol], leaf, "Status", action_summary(leaf))
         return lines
 
     def _reads(self) -> list[str]:
         interface = self.names.interface
-        table = mapping(
+        reads = dict.fromkeys(
             (fact_tuple(variable), str(interface.leaves[variable_symbol(variable)].three_valued))
             for variable in map(self.task.variables.__getitem__, interface.reads)
         )
+        table = mapping(reads)
         return [
             *layout(table, "READS: dict[Fact, bool] = "),
             '"""The facts that the tree reads, and whether they can be unknown."""',
+        ]
+
+    def _own(self) -> list[list[str]]:
+        """The table of what actions hold."""
+        if not self.held:
+            return []
+        table = mapping(
+            (literal(action), sequence(dict.fromkeys(map(self._asked, facts))))
+            for action, facts in sorted(self.held.items())
+        )
+        return [
+            [
+                *layout(table, "OWN: dict[str, list[Fact]] = "),
+                '"""What the tree reads and an action may itself set: held while it runs."""',
+            ]
         ]
 
     # --- tree --------------------------------------------------------------------------------
@@ -192,12 +212,25 @@ class _Writer:
         if self.monitor is not None and node.action in self.monitor.readings:
             told = words_tuple((action.schema, *action.args))
             items = [name, Prefixed("*", call("watched", "robot", told, act))]
+        elif action.timeout is not None:
+            seconds = repr(float(action.timeout))
+            items = [Prefixed("*", call("within", seconds, name, act, "robot.cancel"))]
         guard = guard_of(self.task, node)
         if guard is not None:
             items.append(Prefixed("guard=", self._test(guard)))
         if not node.latched:
             items.append("keep=False")
+        if node.action in self.held:
+            items.append(f"own=OWN[{literal(node.action)}]")
         return call("Try" if node.id in self.tried else "Latch", *items)
+
+    def _asked(self, fact: Fact) -> str:
+        """What the tree calls to read a fact: a method, and its arguments."""
+        variable = first_variable(fact)
+        read = self.task.variables[variable]
+        if self.monitor is not None and variable in self.monitor.known:
+            return words_tuple(("monitor.value", read.predicate, *read.args))
+        return words_tuple((self.names.methods[variable_symbol(read)], *read.args))
 
     def _test(self, condition: Condition) -> Code:
         return _thunk(self.conditions.write(condition, self._read))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from typing_extensions import assert_never
 
 from bbtc.backends.interface import Leaf
 from bbtc.backends.pytrees.pycode import Code, call, flat, layout, literal
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within
+from bbtc.ground.describe import bounds, digit_of
 from bbtc.ground.task import Variable
 from bbtc.kleene import Truth
 
@@ -17,11 +18,12 @@ class ConditionCode:
     """Writes conditions in normal form as Python expressions with the values True, False, None, and
     remembers in :attr:`used` which helper functions they call."""
 
-    def __init__(self) -> None:
+    def __init__(self, variables: Sequence[Variable] = ()) -> None:
         self.used: set[str] = set()
+        self._variables = variables
 
     def write(self, condition: Condition, read: Callable[[int], Code]) -> Code:
-        """The expression; ``read`` writes the access to a variable."""
+        """The expression; ``read`` writes the access to a variable, and to a number by its first digit."""
         match condition:
             case Constant(value):
                 return str(value)
@@ -33,6 +35,11 @@ class ConditionCode:
                 return f"{flat(read(variable))} is None"
             case Known(variable):
                 return f"{flat(read(variable))} is not None"
+            case Within(digits, low, high):
+                least, most = bounds(self._variables, digits, low, high)
+                digit = digit_of(self._variables, digits)
+                ends = [str(least) if low else "None", str(most) if most < digit.high else "None"]
+                return self._helper("between", read(digits[0]), *ends)
             case And(parts):
                 return self._helper("all_of", *(self.write(part, read) for part in parts))
             case Or(parts):
@@ -60,10 +67,18 @@ less, and then the tree starts nothing that needs to know."""
 
 
 _CONDITION, _ACTION, _UNKNOWN = "Whether ", "Start or continue ", "; None where that is unknown"
+_NUMBER = "The value of "
+
+
+def condition_type(leaf: Leaf) -> str:
+    """What the method of a condition, or of a number, returns."""
+    return "int | None" if leaf.counts else CONDITION_TYPE
 
 
 def condition_summary(leaf: Leaf) -> str:
-    """The docstring of the method of a condition."""
+    """The docstring of the method of a condition, or of a number."""
+    if leaf.counts:
+        return f'"""{_NUMBER}{_signature(leaf)}{_UNKNOWN}."""'
     return f'"""{_CONDITION}{_signature(leaf)} holds{_UNKNOWN if leaf.three_valued else ""}."""'
 
 
@@ -74,7 +89,7 @@ def action_summary(leaf: Leaf) -> str:
 
 def is_summary(text: str) -> bool:
     """Is this the docstring of a condition or an action?"""
-    return text.startswith((_CONDITION, _ACTION))
+    return text.startswith((_CONDITION, _ACTION, _NUMBER))
 
 
 def can_be_unknown(summary: str) -> bool:
@@ -88,7 +103,9 @@ def fact_of(leaf: Leaf) -> list[str]:
 
 
 def fact_tuple(variable: Variable) -> str:
-    """A fact as a tuple of its predicate and its arguments."""
+    """A fact as a tuple of its predicate and its arguments; for a digit, its number."""
+    if variable.digit is not None:
+        return words_tuple((variable.digit.function, *variable.args))
     return words_tuple((variable.predicate, *variable.args))
 
 

@@ -15,9 +15,9 @@ from bbtc.backends.interface import Interface, Leaf, action_symbol, variable_sym
 from bbtc.backends.names import PYTHON_RESERVED, module_name
 from bbtc.backends.pytrees.exporter import PyTreesNames, py_trees_names
 from bbtc.backends.pytrees.parts import (
-    CONDITION_TYPE,
     action_summary,
     condition_summary,
+    condition_type,
     fact_of,
     harmless,
     method,
@@ -25,6 +25,7 @@ from bbtc.backends.pytrees.parts import (
 from bbtc.backends.pytrees.pycode import call, layout, literal
 from bbtc.backends.pytrees.runtime import RUNTIME, copied, import_from, imports, needed
 from bbtc.diagnostics import BbtcError
+from bbtc.ground.condition import number_in
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.tree.monitor import FIRST, Monitor
@@ -78,16 +79,17 @@ def _lines(
     problem = harmless(task.problem)
     yield f'"""The robot of {file}.py for the problem {problem}. Begun by bbtc, to be filled in.'
     yield from [*_USAGE.format(file=file).splitlines(), ""]
-    used = {"Any", "Status", "Beliefs"}
+    beliefs = "NumberBeliefs" if any(leaf.counts for leaf in names.interface.asked) else "Beliefs"
+    used = {"Any", "Status", beliefs}
     if embedded:
         used = needed(used)
         yield from imports(used)
     else:
-        yield from imports(used, ("bbtc.runtime", ["Beliefs"]))
+        yield from imports(used, ("bbtc.runtime", [beliefs]))
     yield ""
     watching = [] if tree.monitor is None else ["MONITOR", "Monitor"]
     yield from import_from(module, [*watching, "Robot", "create_root", "run"])
-    for block in copied("beliefs", used) if embedded else []:
+    for block in [*copied("beliefs", used), *copied("numbers", used)] if embedded else []:
         yield from ("", "", *block)
     yield from ("", "", *_class(tree, names, namespace))
     yield from ("", "", *_MAIN.splitlines())
@@ -95,12 +97,16 @@ def _lines(
 
 def _class(tree: Tree, names: PyTreesNames, namespace: list[str]) -> Iterator[str]:
     yield from _HEAD.splitlines()
-    yield from layout(call("Beliefs", *map(literal, namespace)), "self._beliefs = ", level=2)
+    counts = any(leaf.counts for leaf in names.interface.asked)
+    yield from layout(
+        call("NumberBeliefs" if counts else "Beliefs", *map(literal, namespace)), "self._beliefs = ", level=2
+    )
     known = list(_believed_at_start(tree, names.interface))
     if known:
         yield "        # What the problem says of the start:"
     for value, fact in known:
-        yield from layout(call("self._beliefs.believe", value, *map(literal, fact)), level=2)
+        verb = "believe" if value in {"True", "False", "None"} else "count"
+        yield from layout(call(f"self._beliefs.{verb}", value, *map(literal, fact)), level=2)
     if tree.monitor is not None:
         yield "        self.monitor = Monitor(MONITOR, self._beliefs.value)"
         if FIRST in tree.monitor.readings:
@@ -108,9 +114,10 @@ def _class(tree: Tree, names: PyTreesNames, namespace: list[str]) -> Iterator[st
             yield from _telling("        ", (), tree.monitor.readings[FIRST])
     yield from _SETUP.splitlines()
     for leaf in names.interface.asked:
-        reading = layout(call("self._beliefs.value", *fact_of(leaf)), "return ")
+        verb = "number" if leaf.counts else "value"
+        reading = layout(call(f"self._beliefs.{verb}", *fact_of(leaf)), "return ")
         name = names.methods[leaf.symbol]
-        yield from method(name, leaf, CONDITION_TYPE, condition_summary(leaf), *reading)
+        yield from method(name, leaf, condition_type(leaf), condition_summary(leaf), *reading)
     for leaf in names.interface.actions:
         failing = layout(call("self._to_do", *fact_of(leaf)), "return ")
         told = [] if tree.monitor is None else list(_tellings(tree.task, tree.monitor, leaf))
@@ -148,7 +155,13 @@ def _believed_at_start(tree: Tree, interface: Interface) -> Iterator[tuple[str, 
     task = tree.task
     elsewhere = frozenset[int]() if tree.monitor is None else tree.monitor.known
     words = {Truth.TRUE: "True", Truth.FALSE: "False", Truth.UNKNOWN: "None"}
+    for number in task.numbers:
+        given = {number_in(number.digits, state.values) for state in task.initial}
+        if variable_symbol(task.variables[number.digits[0]]) in interface.leaves and len(given) == 1:
+            yield str(number.low + given.pop()), (number.function, *number.args)
     for index, variable in enumerate(task.variables):
+        if variable.digit is not None:
+            continue
         values = {state.values[index] for state in task.initial}
         asked = variable_symbol(variable) in interface.leaves and index not in elsewhere
         if asked and len(values) == 1:

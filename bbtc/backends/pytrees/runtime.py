@@ -24,7 +24,7 @@ RUNTIME = Option(
     ("embedded", "imported"),
 )
 
-MODULES = ("nodes", "world", "beliefs", "monitor", "moving")
+MODULES = ("nodes", "world", "beliefs", "monitor", "moving", "numbers", "limits")
 """The modules of :mod:`bbtc.runtime`."""
 
 

@@ -30,7 +30,7 @@ from bbtc.cli.within_time import WithinTime
 from bbtc.diagnostics import LimitReached
 from bbtc.exit_status import OF_TREE, ExitStatus
 from bbtc.planner.strategies import DEFAULT, others
-from bbtc.watch import importing
+from bbtc.watch import undivided
 
 if TYPE_CHECKING:
     from bbtc.ground.task import Task
@@ -235,7 +235,7 @@ def run_planner(
             hint="another strategy may reach it",
         )
     most = options.max_actions
-    ends = _dead_ends(plan, limits)
+    ends = _dead_ends(plan, limits) if within is None else ()
     made = simplified_line(told[-1], plan.tree) if told and not quiet else []
     lines = [
         *made,
@@ -283,7 +283,7 @@ class Signals:
 
     def stop(self, number: int, frame: FrameType | None) -> None:
         """The handler."""
-        if not self.held and (not self.listening or importing(frame)):
+        if not self.held and (not self.listening or undivided(frame)):
             # Too early, in a moment it will do.
             threading.Timer(_MOMENT, os.kill, (os.getpid(), number)).start()
             return

@@ -256,8 +256,8 @@ def _tree_lines(tree: Tree, stepper: Stepper, full: bool) -> list[str]:
 
 
 def _state(tree: Tree, values: bytes) -> str:
-    from bbtc.kleene import Truth
+    from bbtc.ground.describe import values_in_words
     from bbtc.printable import printable
 
-    pairs = zip(tree.task.variables, values, strict=False)  # behind them: what is believed
-    return printable(", ".join(f"{variable.name} = {Truth(value).word}" for variable, value in pairs))
+    found = values_in_words(tree.task.variables, values)
+    return printable(", ".join(f"{name} = {value}" for name, value in found.items()))

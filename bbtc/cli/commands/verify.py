@@ -104,6 +104,8 @@ def _time(verdict: Verdict) -> list[str]:
     if by is not None and time.by is not None:
         bounds = f"from {time.by[0]:.9g} to {time.by[1]:.9g}"
         lines.append(f"in time   {bounds}, within {decimal(by.seconds, 12)} s")
+    elif by is not None:
+        lines.append("in time   not recomputed, since facts are hidden")
     return lines
 
 

@@ -25,7 +25,7 @@ from bbtc.ground.hidden.priors import Said, prior_diagram
 from bbtc.ground.hidden.relevance import relevant
 from bbtc.ground.hidden.uncertain import hidden_facts
 from bbtc.ground.hidden.worlds import TooManyWorlds, Worlds, given_true
-from bbtc.ground.renumber import reordered
+from bbtc.ground.pruning.renumber import reordered
 from bbtc.ground.start import contradicted
 from bbtc.kleene import Truth
 from bbtc.limits import Limits

@@ -63,7 +63,7 @@ class _Asking:
                 return mf.Or(tuple(map(self.formula, parts)), span)
             case mf.Quantified(_, _, part):
                 return replace(formula, part=self.formula(part))
-            case mf.Atom() | mf.Test() | mf.Equal():
+            case mf.Atom() | mf.Test() | mf.Equal() | mf.Compare():
                 return formula
             case _:
                 assert_never(formula)

@@ -23,6 +23,7 @@ from bbtc.ground.condition import (
     Known,
     Not,
     Or,
+    Within,
     conjunction,
     disjunction,
     doubt,
@@ -76,7 +77,7 @@ class KnownConditions:
             case Is(variable) | Known(variable) if variable in self._tests:
                 unknown = doubt(self.known(self._tests[variable], truth=False), self._unknown)
                 return negation(unknown) if isinstance(condition, Known) else unknown
-            case Is() | Known() | Constant():
+            case Is() | Known() | Within() | Constant():
                 return condition
             case Not(part):
                 return self.known(negation(part), truth=truth)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing_extensions import assert_never
 
 from bbtc.ground import task as gt
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within
 from bbtc.kleene import Truth
 
 _LONGEST = 60
@@ -41,6 +41,8 @@ def _words(variables: Sequence[gt.Variable], formula: Condition) -> str:
             return "not_" + _words(variables, part)
         case Known(variable):
             return f"known_{variables[variable].predicate}"
+        case Within(digits, low, high):
+            return f"{low}_to_{high}_" + "_".join(variables[digit].predicate for digit in digits[:1])
         case Constant(value):
             return Truth.of(value).word
         case _:

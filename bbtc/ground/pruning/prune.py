@@ -14,7 +14,7 @@ from typing_extensions import assert_never
 
 from bbtc.ground import task as gt
 from bbtc.ground.condition import Condition, variables
-from bbtc.ground.renumber import reordered
+from bbtc.ground.pruning.renumber import reordered
 from bbtc.markov import reachable
 
 

@@ -43,7 +43,11 @@ class _Rows:
         self._env = frame.env
         self._keys: dict[Row, None] = {}
         self.guarded = next(me.conditions(schema.effects), None) is not None
-        self._charges = self.guarded and any(isinstance(leaf, me.Add) for leaf in me.leaves(schema.effects))
+        leaves = list(me.leaves(schema.effects))
+        self._charges = (self.guarded and any(isinstance(leaf, me.Add) for leaf in leaves)) or any(
+            isinstance(leaf, me.Change) or (isinstance(leaf, me.Add) and reads_number(lowering, leaf))
+            for leaf in leaves
+        )
         self._conditions = lowering.reached(schema.precondition, schema.parameters)
         self._literals = _literals(lowering, schema.precondition, Frame(lowering.universe, schema.parameters))
 
@@ -90,6 +94,11 @@ class _Rows:
             for guard in self._effect.charged(self._env(key), []):
                 for part in guard:
                     yield from variables(part)
+
+
+def reads_number(lowering: Lowering, leaf: me.Add) -> bool:
+    """Does what is added to costs or rewards depend on numbers of the state?"""
+    return lowering.amounts.depends(leaf.amount)
 
 
 def _literals(lowering: Lowering, formula: mf.Formula, frame: Frame) -> list[Numbers] | None:

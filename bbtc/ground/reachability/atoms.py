@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping
 from enum import Enum
 from functools import cached_property
+from types import MappingProxyType
 from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.ground.condition import FALSE, TRUE, And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import FALSE, TRUE, And, Condition, Constant, Is, Known, Not, Or, Within
 from bbtc.ground.reachability.reach import Reach
-from bbtc.ground.task import Variable, ground_name
+from bbtc.ground.task import Digit, Variable, ground_name
 from bbtc.ground.universe import Row
 from bbtc.kleene import Truth
 
@@ -23,6 +24,9 @@ Pair = tuple[int, Truth]
 """A variable and the value that it is set to."""
 Key: TypeAlias = tuple[str, Row]
 """Predicate and arguments of a ground atom."""
+
+
+NO_DIGITS: Mapping[str, Digit] = MappingProxyType({})
 
 
 class Scope(Enum):
@@ -141,15 +145,18 @@ class Atoms:
         number = {key: index for index, key in enumerate(self.keys)}
         return [number[key] for key in self._sorted(rows)]
 
-    def variables(self) -> tuple[Variable, ...]:
-        """The variables of the task, by number."""
+    def variables(self, digits: Mapping[str, Digit] = NO_DIGITS) -> tuple[Variable, ...]:
+        """The variables of the task, by number; ``digits`` tells which predicates are digits of numbers."""
         spans = {(fact.predicate, fact.args): fact.span for fact in self.model.init.facts}
         made = []
         for name, row in self.keys:
             args = self.universe.args(row)
             span = spans.get((name, args)) or self.model.predicates[name].span
             external = self.model.predicates[name].external
-            made.append(Variable(name, args, self._unknowable(name, row), span=span, external=external))
+            unknowable = self._unknowable(name, row)
+            made.append(
+                Variable(name, args, unknowable, digit=digits.get(name), span=span, external=external)
+            )
         return tuple(made)
 
     def _unknowable(self, predicate: str, row: Row) -> bool:
@@ -262,6 +269,8 @@ class Atoms:
             case Known(number):
                 name, row = self.keys[number]
                 return self._possible[name].get(row, _ONLY_FALSE) != (Truth.UNKNOWN,)
+            case Within():
+                return True  # what numbers can be is not traced
             case And(parts):
                 return all(map(self.can_be_true, parts))
             case Or(parts):

@@ -80,13 +80,14 @@ def _in_child(
         path = Path(folder, "program.lp")
         path.write_text("\n".join(program), encoding="ascii")
         command = [sys.executable, "-I", "-S", "-c", _CHILD, str(path), str(limits.memory or 0), *sys.path]
+        timer = None
         # Our own interpreter and our own program text: nothing of the input is a command.
         process = subprocess.Popen(  # noqa: S603
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
-        timer = None if seconds is None else threading.Timer(seconds, process.kill)
         try:
-            if timer is not None:
+            if seconds is not None:
+                timer = threading.Timer(seconds, process.kill)
                 timer.start()
             rows = _collect(process, outputs, counted, limits)
             process.wait()

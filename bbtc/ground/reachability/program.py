@@ -19,6 +19,8 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
+from typing_extensions import assert_never
+
 from bbtc.ground.normal import Block, Group, conjuncts, disjuncts, groups, normal_form
 from bbtc.ground.reachability.usage import Usage, called
 from bbtc.ground.universe import Universe
@@ -268,8 +270,8 @@ class ProgramBuilder:
     def _is_simple(self, part: mf.Formula) -> bool:
         """Whether the part becomes plain literals, without auxiliary predicates."""
         match part:
-            case mf.Atom() | mf.Equal() | mf.Not(mf.Equal()):
-                return True
+            case mf.Atom() | mf.Equal() | mf.Not(mf.Equal()) | mf.Compare():
+                return True  # what numbers can be is not traced: a comparison may hold
             case mf.Not(mf.Atom(predicate)):
                 return self.usage.is_static(predicate) or predicate in self.usage.derived
             case mf.Test(kind, atom):
@@ -469,9 +471,17 @@ def all_groups(
             yield from all_groups(branch, around + chance.parameters, guard + chance.guard)
 
 
-def _shows(leaf: me.Set | me.Add) -> bool:
+def _shows(leaf: me.Leaf) -> bool:
     """Whether it can matter that the leaf happens, whatever holds: costs alone do not."""
-    return leaf.to == "reward" if isinstance(leaf, me.Add) else leaf.value is not Truth.FALSE
+    match leaf:
+        case me.Add(to):
+            return to == "reward"
+        case me.Set(_, _, value):
+            return value is not Truth.FALSE
+        case me.Change():
+            return True
+        case _:
+            assert_never(leaf)
 
 
 def _read(part: mf.Formula, scope: tuple[Parameter, ...]) -> tuple[Parameter, ...]:

@@ -15,7 +15,20 @@ from typing_extensions import assert_never
 
 from bbtc.belief.draws import Values
 from bbtc.belief.state import State, Transition, compile_action
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, conjuncts, evaluate, variables
+from bbtc.ground.condition import (
+    And,
+    Condition,
+    Constant,
+    Is,
+    Known,
+    Not,
+    Or,
+    Within,
+    conjuncts,
+    evaluate,
+    in_digits,
+    variables,
+)
 from bbtc.ground.task import GroundAction, Task, apparent_factors, effects_of
 from bbtc.kleene import Truth, negate
 from bbtc.limits import Limits
@@ -245,6 +258,8 @@ def helpful(condition: Condition, value: Truth) -> Iterator[tuple[int, Truth]]:
         case Known(variable):
             yield variable, Truth.TRUE
             yield variable, Truth.FALSE
+        case Within():
+            yield from helpful(in_digits(condition), value)
         case And(parts) | Or(parts):
             for part in parts:
                 yield from helpful(part, value)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bbtc import durations
-from bbtc.durations import Duration
+from bbtc.durations import Taken
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.mdp.contraction import contracted
@@ -86,7 +86,7 @@ def groups(
     process: TimedProcess, step: Fraction, most: int, *, late: bool, only: Sequence[int] | None = None
 ) -> list[Group]:
     """The ways of all choices, or of some, by what they take."""
-    rows: dict[tuple[Duration, Fraction | None], list[tuple[int, int, float]]] = {}
+    rows: dict[tuple[Taken, Fraction | None], list[tuple[int, int, float]]] = {}
     for choice in range(len(process.ways)) if only is None else only:
         for way in process.ways[choice]:
             entries = rows.setdefault((way.duration, way.at_most), [])

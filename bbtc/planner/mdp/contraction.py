@@ -70,7 +70,8 @@ def _onward(branching: Branching, successor: Index, through: Flags) -> tuple[Ind
     and these edges."""
     places = np.flatnonzero(through)
     choices = branching.choices_of(successor[places])
-    owners = np.repeat(places, np.bincount(branching.choice_state, minlength=len(through))[successor[places]])
+    states = int(successor.max(initial=-1)) + 1
+    owners = np.repeat(places, np.bincount(branching.choice_state, minlength=states)[successor[places]])
     return np.repeat(owners, branching.edge_counts(choices)), branching.edges_of(choices)
 
 

@@ -14,7 +14,7 @@ from itertools import product
 from math import prod
 
 from bbtc.ground.condition import TRUE, Condition, Is, Known, is_test, negation, replaced, variables
-from bbtc.ground.renumber import Renumbering
+from bbtc.ground.pruning.renumber import Renumbering
 from bbtc.ground.task import (
     ONE,
     Change,

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from typing_extensions import assert_never
 
 from bbtc.belief.draws import Values
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
 from bbtc.ground.task import Factor, Knowledge, Task, apparent_factors, seen_factors
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -73,6 +73,8 @@ class Facts:
                 return float(self.costs[3 * variable + value])
             case Known(variable):
                 return float(min(self.costs[3 * variable], self.costs[3 * variable + 2]))
+            case Within():
+                return self.cost(in_digits(condition))
             case And(parts):
                 return sum(map(self.cost, parts), 0.0)
             case Or(parts):
@@ -158,6 +160,8 @@ class Relaxation:
                 return [self._always + 1]
             case Constant() | Not():
                 return []
+            case Within():
+                return self._body(in_digits(condition))
             case Known(variable):
                 ways: list[list[int]] = [[3 * variable], [3 * variable + 2]]
             case Or(parts):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.belief.draws import PLACES, Values
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within, in_digits
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 
@@ -208,6 +208,8 @@ def bit_test(packing: Packing, condition: Condition, value: bool = True) -> BitT
         case Is(variable, wanted):
             true = value == (wanted is Truth.TRUE)
             return Cube(packing.bits(variable), 1 << variable if true else 0)
+        case Within():
+            return bit_test(packing, in_digits(condition), value)
         case And(parts) if value:
             return every(bit_test(packing, part, True) for part in parts)
         case Or(parts) if not value:

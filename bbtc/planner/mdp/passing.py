@@ -74,27 +74,35 @@ class Passing:
     @classmethod
     def of(cls, task: Task) -> Passing | None:
         """The stages of a task; None where there would be too many."""
-        groups = [group for events in task.rounds for group in _groups(events)]
-        if len(groups) > _MOST_GROUPS or any(_size(group) > 8 * _MOST_TOGETHER for group in groups):
-            return None
-        if not groups:
+        if not task.events:
             return cls.none(task)
-        draws = [tuple(factor for event in group for factor in _conditional(event)) for group in groups]
-        count = len(draws)
-        steps = [Step(1 + n, TRUE, factors, (2 + n) % (count + 1)) for n, factors in enumerate(draws)]
+        steps: list[Step] = []
         after, interrupted = [], set[int]()
-        stages = 1 + count
+        stages, longest = 1, 0
+        shared: dict[tuple[tuple[GroundEvent, ...], ...], int] = {}
         for number, action in enumerate(task.actions):
-            if action.during is None:
-                after.append(1)
+            rounds = task.rounds(action)
+            if action.during is None and rounds in shared:
+                after.append(shared[rounds])
                 continue
-            interrupted.add(number)
+            groups = [group for events in rounds for group in _groups(events)]
+            draws = [tuple(factor for event in group for factor in _conditional(event)) for group in groups]
+            count = len(draws)
+            if count > _MOST_GROUPS or any(_size(group) > 8 * _MOST_TOGETHER for group in groups):
+                return None
             after.append(stages)
             steps += [Step(stages + n, TRUE, factors, stages + n + 1) for n, factors in enumerate(draws)]
-            steps.append(Step(stages + count, action.during, action.factors, 0))
-            steps.append(Step(stages + count, _failing(action.during), action.on_abort, 0))
-            stages += count + 1
-        return cls(stages, count, tuple(after), frozenset(interrupted), tuple(steps))
+            if action.during is None:
+                shared[rounds] = stages
+                steps[-1] = replace(steps[-1], after=0)
+                stages += count
+            else:
+                interrupted.add(number)
+                steps.append(Step(stages + count, action.during, action.factors, 0))
+                steps.append(Step(stages + count, _failing(action.during), action.on_abort, 0))
+                stages += count + 1
+            longest = max(longest, count)
+        return cls(stages, longest, tuple(after), frozenset(interrupted), tuple(steps))
 
 
 def _failing(condition: Condition) -> Condition:

@@ -285,4 +285,4 @@ def certainly(task: Task, condition: Condition) -> Condition:
             return And((Known(leaf.variable), leaf))
         return leaf
 
-    return replaced(condition, certain)
+    return replaced(condition, certain, numbers=lambda number: number)

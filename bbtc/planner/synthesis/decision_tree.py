@@ -20,18 +20,12 @@ from bbtc.limits import Limits
 from bbtc.planner.mdp.packing import Flags
 from bbtc.planner.mdp.transitions import Index
 from bbtc.planner.synthesis.permissive import MultiPolicy
-from bbtc.planner.synthesis.rules import Literal, Test
+from bbtc.planner.synthesis.rules import Literal, Test, cuts_of
 from bbtc.planner.synthesis.tree import control, goal_node, truths
 from bbtc.rewrite.simplify import numbered
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node
 
 _END = -1
-_OPPOSITE = {
-    Test.TRUE: Test.FALSE,
-    Test.FALSE: Test.TRUE,
-    Test.UNKNOWN: Test.KNOWN,
-    Test.KNOWN: Test.UNKNOWN,
-}
 
 
 def decision_tree(task: Task, policy: MultiPolicy, limits: Limits, *, fall_through: bool = False) -> Node:
@@ -69,7 +63,9 @@ class _Builder:
         self.task, self.values, self.label, self.limits = task, values, label, limits
         self.fails = fails
         """May any action fail to start?"""
-        found = [Literal(at, test) for at in range(values.shape[1]) for test in (Test.TRUE, Test.UNKNOWN)]
+        facts = [at for at in range(values.shape[1]) if task.variables[at].digit is None]
+        found = [Literal(at, test) for at in facts for test in (Test.TRUE, Test.UNKNOWN)]
+        found += cuts_of(task, values)
         found = [each for each in found if each.holds(values).any() and not each.holds(values).all()]
         self.literals = found
         columns = [literal.holds(values) for literal in found]
@@ -131,7 +127,7 @@ class _Builder:
                 control("sequence", [ConditionNode("", test.condition), *_children(left, "sequence")])
             )
         if right is not None and (left is None or left_fails):
-            opposite = Literal(test.variable, _OPPOSITE[test.test]).condition
+            opposite = test.opposite.condition
             right = control("sequence", [ConditionNode("", opposite), *_children(right, "sequence")])
         if right is not None:
             parts.extend(_children(right, "fallback"))

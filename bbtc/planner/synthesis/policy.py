@@ -209,6 +209,9 @@ class _Search:
     def _keep(self, root: Node, limits: Limits | None = None) -> None:
         """Take a tree for the best so far, unless it does worse and does not reach the target."""
         limits = limits or self.limits
+        if self.task.events and self.found is not None and self.found.space.fringe.any():
+            # What happens by itself may lead to where the space was not looked at.
+            root = with_guards(self.task, root)
         limits.check_nodes(size(root))
         chain = explore(self.task, root, limits)
         success = success_of(chain)

@@ -7,14 +7,15 @@ forgotten, so later rules need to tell fewer states apart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.ground.condition import Condition, Is, Known, leaves
+from bbtc.ground.condition import Condition, Is, Known, leaves, numbers_read, within
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -30,14 +31,31 @@ class Test(IntEnum):
     FALSE = 1
     UNKNOWN = 2
     KNOWN = 3
+    AT_LEAST = 4
+    BELOW = 5
+
+
+OPPOSITE = {
+    Test.TRUE: Test.FALSE,
+    Test.FALSE: Test.TRUE,
+    Test.UNKNOWN: Test.KNOWN,
+    Test.KNOWN: Test.UNKNOWN,
+    Test.AT_LEAST: Test.BELOW,
+    Test.BELOW: Test.AT_LEAST,
+}
+_MOST_CUTS = 1_024
+"""Values of one number between which is told apart; where more are visited, so many of them."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class Literal:
-    """A two-valued test of one variable."""
+    """A two-valued test of one variable; or of a number, by its digits, the first of which is the variable:
+    is it at least ``bound``, or below that?"""
 
     variable: int
     test: Test
+    digits: tuple[int, ...] = ()
+    bound: int = 0
 
     @property
     def condition(self) -> Condition:
@@ -51,9 +69,21 @@ class Literal:
                 return Is(self.variable, Truth.UNKNOWN)
             case Test.KNOWN:
                 return Known(self.variable)
+            case Test.AT_LEAST:
+                return within(self.digits, self.bound, 1 << len(self.digits))
+            case Test.BELOW:
+                return within(self.digits, 0, self.bound - 1)
+
+    @property
+    def opposite(self) -> Literal:
+        """What holds where it does not."""
+        return replace(self, test=OPPOSITE[self.test])
 
     def holds(self, values: npt.NDArray[np.uint8]) -> Flags:
         """In which rows of values it holds."""
+        if self.digits:
+            at_least: Flags = numbers_of(values, self.digits) >= self.bound
+            return at_least if self.test is Test.AT_LEAST else ~at_least
         column = values[:, self.variable]
         match self.test:
             case Test.TRUE:
@@ -62,9 +92,17 @@ class Literal:
                 found = column == Truth.FALSE
             case Test.UNKNOWN:
                 found = column == Truth.UNKNOWN
-            case Test.KNOWN:
+            case _:
                 found = column != Truth.UNKNOWN
         return found
+
+
+def numbers_of(values: npt.NDArray[np.uint8], digits: Sequence[int]) -> npt.NDArray[np.int64]:
+    """What the digits of a number say in each row of values."""
+    found = np.zeros(len(values), dtype=np.int64)
+    for place, digit in enumerate(digits):
+        found += (values[:, digit] >> 1).astype(np.int64) << place
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +120,7 @@ class Learner:
 
     def __init__(self, task: Task, policy: MultiPolicy, limits: Limits) -> None:
         self.task, self.policy, self.limits = task, policy, limits
-        self.literals = literals_of(policy.values)
+        self.literals = literals_of(task, policy.values)
         columns = [literal.holds(policy.values) for literal in self.literals]
         self.holds = np.array(columns, dtype=np.bool_).T.reshape(len(policy.goal), len(self.literals))
         self.taken = np.ones(len(policy.choice_action), dtype=np.bool_)
@@ -191,25 +229,59 @@ def separating(wanted: Flags, others: Flags, own: npt.NDArray[np.float64]) -> li
     return chosen
 
 
-def literals_of(values: npt.NDArray[np.uint8]) -> list[Literal]:
+def literals_of(task: Task, values: npt.NDArray[np.uint8]) -> list[Literal]:
     """The literals that tell some of the states apart, one of each set that hold alike."""
     found: dict[bytes, Literal] = {}
+
+    def add(literal: Literal) -> None:
+        holds = literal.holds(values)
+        if holds.any() and not holds.all():
+            found.setdefault(holds.tobytes(), literal)
+
     for variable in range(values.shape[1]):
+        if task.variables[variable].digit is not None:
+            continue
         present = set(values[:, variable].tolist())
         tests = [Test.TRUE, Test.FALSE]
         if Truth.UNKNOWN in present:
             tests += [Test.UNKNOWN, Test.KNOWN]
         for test in tests:
-            literal = Literal(variable, test)
-            holds = literal.holds(values)
-            if holds.any() and not holds.all():
-                found.setdefault(holds.tobytes(), literal)
+            add(Literal(variable, test))
+    for literal in cuts_of(task, values):
+        add(literal)
+        add(literal.opposite)
     return sorted(found.values())
+
+
+def cuts_of(task: Task, values: npt.NDArray[np.uint8]) -> Iterator[Literal]:
+    """For each number, tests between the values that it has in some states: where preconditions or the goal
+    ask for a bound between two of them, that one. Of very many values, so many are told apart by these tests;
+    then tests of single digits tell the others apart."""
+    stated: dict[tuple[int, ...], set[int]] = {}
+    for condition in (task.goal, *(action.precondition for action in task.actions)) if task.numbers else ():
+        for read in numbers_read(condition):
+            stated.setdefault(read.digits, set()).update((read.low, read.high + 1))
+    for number in task.numbers:
+        present = np.unique(numbers_of(values, number.digits)).tolist()
+        if len(present) > _MOST_CUTS:
+            present = present[:: -(-len(present) // _MOST_CUTS)]
+            for digit in number.digits:
+                yield Literal(digit, Test.TRUE)
+        bounds = sorted(stated.get(number.digits, ()))
+        for below, value in pairwise(present):
+            between = next((bound for bound in bounds if below < bound <= value), value)
+            yield Literal(number.digits[0], Test.AT_LEAST, number.digits, between)
 
 
 def _stated(condition: Condition) -> list[Literal]:
     tests = {Truth.TRUE: Test.TRUE, Truth.FALSE: Test.FALSE, Truth.UNKNOWN: Test.UNKNOWN}
-    return [
+    found = [
         Literal(leaf.variable, tests[leaf.value] if isinstance(leaf, Is) else Test.KNOWN)
         for leaf in leaves(condition)
     ]
+    for read in numbers_read(condition):
+        if read.low:
+            found.append(Literal(read.digits[0], Test.AT_LEAST, read.digits, read.low))
+        if read.high < read.most:
+            found.append(Literal(read.digits[0], Test.BELOW, read.digits, read.high + 1))
+    return found

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from bbtc.ground.condition import FALSE, Condition, compile_condition, conjuncts
+from bbtc.ground.condition import FALSE, Condition, compile_condition, conjuncts, within
 from bbtc.ground.task import Task
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
@@ -181,6 +181,13 @@ class _Builder:
         asked = rule.asked
         nodes: list[Node] = []
         while waiting:
+            if waiting[0].digits:  # all that is asked of a number at once
+                alike = [test for test in waiting if test.digits == waiting[0].digits]
+                waiting = [test for test in waiting if test not in alike]
+                nodes.append(ConditionNode("", _together(alike)))
+                for test in alike:
+                    asked = asked[test.holds(self.values[asked])]
+                continue
             literal = next((t for t in waiting if self._settled([t], asked)), None)
             if literal is None:  # rule 5
                 literal = Literal(waiting[0].variable, Test.KNOWN)
@@ -197,3 +204,11 @@ class _Builder:
             or not (self.values[asked, test.variable] == Truth.UNKNOWN).any()
             for test in tests
         )
+
+
+def _together(tests: Sequence[Literal]) -> Condition:
+    """Tests of one number as one condition."""
+    digits = tests[0].digits
+    low = max((test.bound for test in tests if test.test is Test.AT_LEAST), default=0)
+    below = min((test.bound for test in tests if test.test is Test.BELOW), default=1 << len(digits))
+    return within(digits, low, below - 1)

@@ -27,6 +27,7 @@ from bbtc.runtime import (
     sequence,
     simulate,
     skipper,
+    view,
 )
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -60,6 +61,7 @@ class Robot(Protocol):
 
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
+    robot = view(robot)
     return StopWhenBlocked(
         robot,
         skipper(
@@ -76,11 +78,21 @@ def create_root(robot: Robot) -> Behaviour:
                             Condition("luminousity_ok()", robot.luminousity_ok),
                             sequence(
                                 "sequence",
-                                Latch("light_on()", robot.light_on, robot.cancel),
+                                Latch(
+                                    "light_on()",
+                                    robot.light_on,
+                                    robot.cancel,
+                                    own=OWN["light_on()"],
+                                ),
                                 Condition("luminousity_ok()", robot.luminousity_ok),
                             ),
                         ),
-                        Latch("detect(soda)", lambda: robot.detect("soda"), robot.cancel),
+                        Latch(
+                            "detect(soda)",
+                            lambda: robot.detect("soda"),
+                            robot.cancel,
+                            own=OWN["detect(soda)"],
+                        ),
                         Condition("known seen(soda)", lambda: robot.seen("soda") is not None),
                     ),
                 ),
@@ -93,6 +105,13 @@ def create_root(robot: Robot) -> Behaviour:
 
 READS: dict[Fact, bool] = {("luminousity_ok",): False, ("seen", "soda"): True}
 """The facts that the tree reads, and whether they can be unknown."""
+
+
+OWN: dict[str, list[Fact]] = {
+    "detect(soda)": [("seen", "soda")],
+    "light_on()": [("luminousity_ok",)],
+}
+"""What the tree reads and an action may itself set: held while it runs."""
 
 
 INITIAL: list[tuple[str, State]] = [("1", {("luminousity_ok",): False, ("seen", "soda"): None})]

@@ -7,7 +7,8 @@
 //         S node id args…   an action starts: 1, 2
 //         G node            … goes on: 1, 2
 //         H node            … is halted
-//         T status          a tick has ended: 1 to tick again, 0 to begin a new run, q to quit
+//         T status          a tick has ended: 1 to tick again, h to be halted by a larger tree and asked
+//                           again, 0 to begin a new run, q to quit
 // An answer x ends the run: the next question is "T 3".
 #include <iostream>
 #include <sstream>
@@ -24,6 +25,7 @@ struct Stop : std::runtime_error {
 };
 
 bool stopped = false;
+bool paused = false;
 
 std::string ask(const std::string& question) {
   std::cout << question << std::endl;
@@ -114,9 +116,15 @@ int main(int count, char** arguments) {
     }
   }
   factory.registerBehaviorTreeFromFile(given.at(1));
+  factory.registerSimpleCondition("DriverPaused", [](BT::TreeNode&) {
+    return paused ? BT::NodeStatus::RUNNING : BT::NodeStatus::FAILURE;
+  });
+  factory.registerBehaviorTreeFromText(
+      "<root BTCPP_format=\"4\"><BehaviorTree ID=\"DriverOuter\"><ReactiveFallback><DriverPaused/>"
+      "<SubTree ID=\"" + given.at(2) + "\"/></ReactiveFallback></BehaviorTree></root>");
   while (true) {
     stopped = false;
-    auto tree = factory.createTree(given.at(2));
+    auto tree = factory.createTree("DriverOuter");
     for (std::string answer = "1"; answer == "1";) {
       int ended = 3;
       try {
@@ -130,6 +138,12 @@ int main(int count, char** arguments) {
         }
       }
       answer = ask("T " + std::to_string(ended));
+      if (answer == "h") {
+        paused = true;
+        tree.tickExactlyOnce();
+        paused = false;
+        answer = ask("T 1");
+      }
       if (answer == "q") {
         return 0;
       }

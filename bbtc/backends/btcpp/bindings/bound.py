@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element, SubElement
 
@@ -66,6 +66,17 @@ class BoundNodes:
 
     leaves: Mapping[Symbol, BoundLeaf] = field(default_factory=dict)
     models: Mapping[str, NodeModel] = field(default_factory=dict)
+
+    def refuse_held(self, symbols: Iterable[Symbol]) -> None:
+        """Raise :class:`BbtcError` (BBT0713) for a condition of these that is a node of others: our control
+        nodes know what a running action holds by our own leaves."""
+        for bound in (self.leaves[symbol] for symbol in symbols if symbol in self.leaves):
+            message = (
+                f"'{clip(bound.binding.name)}' is bound, and a running action may set it: "
+                "our control nodes (nodes=bbtc) hold leaves of ours only"
+            )
+            hint = "export with -O nodes=stock, or leave it unbound"
+            raise BbtcError.single("BBT0713", message, bound.binding.span, hint)
 
     def element(self, symbol: Symbol, args: tuple[str, ...], value: Callable[[str], str]) -> Element | None:
         """The node that stands for a leaf; None where it is one of ours. ``value`` gives the text for an
@@ -135,8 +146,7 @@ def bound_leaves(tree: Tree, interface: Interface, bindings: Bindings) -> dict[S
     found: dict[Symbol, BoundLeaf] = {}
     uses = _uses(tree)
     for leaf in (*interface.conditions, *interface.actions):
-        kind: Kind = "action" if leaf.symbol.kind == "action" else "predicate"
-        binding = bindings.find(kind, leaf.symbol.name)
+        binding = None if leaf.counts else bindings.find(_kind(leaf), leaf.symbol.name)
         if binding is None:
             continue
         bound = BoundLeaf(leaf, binding, _parameter_names(tree.task, leaf))
@@ -148,6 +158,10 @@ def bound_leaves(tree: Tree, interface: Interface, bindings: Bindings) -> dict[S
     if faults:
         raise BbtcError(faults)
     return found
+
+
+def _kind(leaf: Leaf) -> Kind:
+    return "action" if leaf.symbol.kind == "action" else "predicate"
 
 
 def bound_nodes(tree: Tree, interface: Interface, bindings: Bindings) -> BoundNodes:
@@ -202,7 +216,10 @@ def _unknown(task: Task, bindings: Bindings) -> Iterator[Diagnostic]:
         if binding.name not in known:
             what = "action" if binding.kind == "action" else "predicate"
             message = f"the domain '{clip(task.domain)}' has no {what} '{clip(binding.name)}'"
-            yield Diagnostic("BBT0708", message, binding.span, hint=nearest(binding.name, known))
+            hint = nearest(binding.name, known)
+            if any(each.symbol == binding.name for each in task.signatures if each.kind == "function"):
+                hint = "it is a number, and these are not bound"
+            yield Diagnostic("BBT0708", message, binding.span, hint=hint)
             continue
         signatures = [s for s in task.signatures if (s.kind, s.symbol) == (binding.kind, binding.name)]
         yield from _unknown_parameters(binding, signatures)

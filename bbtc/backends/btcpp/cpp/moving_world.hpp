@@ -25,9 +25,12 @@ struct Interruption {
   std::vector<Factor> abort;
 };
 
-/// The events of each round, and the actions that they may end.
+/// Events, round by round.
+using Rounds = std::vector<std::vector<Event>>;
+
+/// The events of each action, and the actions that they may end.
 struct Moves {
-  std::vector<std::vector<Event>> rounds;
+  std::map<std::string, Rounds> events;
   std::map<std::string, Interruption> interrupted;
 };
 
@@ -43,14 +46,14 @@ class MovingWorld : public SimulatedWorld {
     if (interruption == moves_.interrupted.end()) {
       const BT::NodeStatus status = SimulatedWorld::act(action);
       if (status != BT::NodeStatus::RUNNING) {
-        move();
+        move(action);
       }
       return status;
     }
     if (running_[action] + 1 < ticks_) {
       return SimulatedWorld::act(action);
     }
-    move();
+    move(action);
     if (interruption->second.goes_on(state_) == Truth::True) {
       return SimulatedWorld::act(action);
     }
@@ -64,8 +67,8 @@ class MovingWorld : public SimulatedWorld {
 
  private:
   /// The events of one draw: those of a round all read the state that it begins with.
-  void move() {
-    for (const auto& events : moves_.rounds) {
+  void move(const std::string& action) {
+    for (const auto& events : moves_.events.at(action)) {
       std::map<std::size_t, Truth> changes;
       for (const auto& event : events) {
         if (!event.when || event.when(state_) == Truth::True) {

@@ -3,14 +3,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Generic, Protocol, TypeVar
 
 from bbtc.artefacts.cursor import clip
+from bbtc.backends.btcpp.reader.holding import Holds
 from bbtc.backends.btcpp.reader.leaves import Leaves
-from bbtc.backends.btcpp.reader.patterns import KNOWN, REGISTER, UNKNOWN, Match, has, match, tag_of
+from bbtc.backends.btcpp.reader.patterns import (
+    HELD_LEAF,
+    KNOWN,
+    NOTE,
+    REGISTER,
+    UNKNOWN,
+    Match,
+    has,
+    match,
+    match_one,
+    tag_of,
+)
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
+from bbtc.backends.commitment import Fact
 from bbtc.backends.shape import DEEPEST_CONDITION, can_be_unknown
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Or, negation
 from bbtc.ground.task import Task
@@ -41,6 +54,7 @@ class ConditionReader(Generic[S]):
         document: XmlDocument,
         leaves: Leaves,
         unread: Unread,
+        holds: Holds,
         *,
         call: Callable[[XmlElement, S], tuple[XmlElement, S]],
         count: Callable[[], None],
@@ -49,6 +63,7 @@ class ConditionReader(Generic[S]):
         self._document = document
         self._leaves = leaves
         self._unread = unread
+        self._holds = holds
         self._call = call
         self._count = count
 
@@ -56,7 +71,7 @@ class ConditionReader(Generic[S]):
         """Whether an element that is no sequence or fallback is written for a condition alone."""
         if has(element, "Inverter", 1) or tag_of(element) in _CONSTANTS:
             return True
-        if match(KNOWN, element) is not None or match(UNKNOWN, element) is not None:
+        if match_one((KNOWN, UNKNOWN, *HELD_LEAF), element) is not None:
             return True
         return self._leaves.is_leaf(element) and not self._leaves.is_action(element)
 
@@ -92,6 +107,8 @@ class ConditionReader(Generic[S]):
             condition = yield self.read(register.part("condition"), scope, level, registered=True)
         elif test is not None:
             condition = self._test(test, scope)
+        elif (held := match_one(HELD_LEAF, element)) is not None:
+            condition = self._held(held, scope)
         elif has(element, "SubTree"):
             condition = yield self.read(*self._call(element, scope), level)
         elif has(element, "Inverter", 1):
@@ -104,7 +121,7 @@ class ConditionReader(Generic[S]):
             if not has(element, "Parallel"):
                 self._check_order(element, condition)
         elif self._leaves.is_leaf(element) and not element.children:
-            condition = Is(self._leaves.variable(element, scope.ports), Truth.TRUE)
+            condition = self._live(element, scope)
         else:
             message = f"'{clip(tag_of(element))}' is not part of a condition"
             raise unreadable(self._document, element, "BBT0616", message)
@@ -113,8 +130,51 @@ class ConditionReader(Generic[S]):
 
     def _test(self, test: Match, scope: S) -> Condition:
         self._unread.take(test)
-        variable = self._leaves.variable(test.part("leaf"), scope.ports)
+        leaf, inside = test.part("leaf"), scope
+        if has(leaf, "SubTree"):
+            self._unread.took(leaf)
+            leaf, inside = self._call(leaf, scope)
+        held = match_one(HELD_LEAF, leaf)
+        read = self._live(leaf, inside) if held is None else self._held(held, inside)
+        if not isinstance(read, Is):
+            message = f"'{clip(tag_of(leaf))}' is always known"
+            raise unreadable(self._document, leaf, "BBT0616", message)
+        variable = read.variable
         return Known(variable) if test.shape is KNOWN else Is(variable, Truth.UNKNOWN)
+
+    def _live(self, leaf: XmlElement, scope: S) -> Condition:
+        """What a leaf reads as it is."""
+        condition = self._leaves.condition(leaf, scope.ports)
+        self._holds.live.update(self._holds.facts_of(condition))
+        return condition
+
+    def _held(self, held: Match, scope: S) -> Condition:
+        """What a leaf reads, where that may be held."""
+        self._unread.take(held)
+        leaf = held.part("leaf")
+        if not self._leaves.is_leaf(leaf) or self._leaves.is_action(leaf):
+            message = f"'{clip(tag_of(leaf))}' is no condition of the task that could be held"
+            raise unreadable(self._document, leaf, "BBT0616", message)
+        condition = self._leaves.condition(leaf, scope.ports)
+        for fact in self._holds.facts_of(condition) if "held" in held.texts else ():
+            self._holds.entry(leaf, held.texts["held"], scope.ports, fact)
+        return condition
+
+    def note(self, element: XmlElement, scope: S) -> Iterator[Fact]:
+        """What a note tells of. Raises :class:`bbtc.diagnostics.Unreadable`."""
+        self._count()
+        self._unread.took(element)
+        if has(element, "SubTree"):
+            element, scope = self._call(element, scope)
+        found = match(NOTE, element)
+        if found is None:
+            message = f"'{clip(tag_of(element))}' does not write down what an action may set"
+            raise unreadable(self._document, element, "BBT0616", message)
+        self._unread.take(found)
+        leaf = found.part("leaf")
+        for fact in self._holds.facts_of(self._leaves.condition(leaf, scope.ports)):
+            self._holds.entry(leaf, found.texts["held"], scope.ports, fact)
+            yield fact
 
     def _kind(
         self, element: XmlElement, *, registered: bool

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -11,10 +12,14 @@ from bbtc.backends.btcpp.reader.layout import is_port
 from bbtc.backends.btcpp.reader.patterns import tag_of
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
-from bbtc.backends.interface import action_symbol, parameters_of, variable_symbol
+from bbtc.backends.interface import BOUNDS, action_symbol, parameters_of, variable_symbol
 from bbtc.backends.names import Kind, Symbol, camel, port_values, possible_identifiers
 from bbtc.diagnostics import Unreadable
+from bbtc.ground.condition import Condition, Is, within
 from bbtc.ground.task import Task, ground_name
+from bbtc.kleene import Truth
+
+_WHOLE = re.compile(r"[+-]?[0-9]{1,12}", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +72,37 @@ class Leaves:
             raise self._unknown(element, "variable", name, list(self._task.variable_index))
         return self._task.variable_index[name]
 
+    def is_number(self, element: XmlElement) -> bool:
+        """Whether an id can only be that of a number."""
+        found = self._found(element)
+        return bool(found) and all(symbol.kind == "function" for symbol in found)
+
+    def number(self, element: XmlElement, ports: Mapping[str, str]) -> Condition:
+        """What the leaf of a number asks. Raises :class:`Unreadable`."""
+        name = self._ground(element, ports, "function")
+        if name not in self._task.number_by_name:
+            raise self._unknown(element, "number", name, list(self._task.number_by_name))
+        number = self._task.number_by_name[name]
+        least, most = (self._bound(element, port, ports) for port in BOUNDS)
+        low = 0 if least is None else least - number.low
+        top = (1 << len(number.digits)) - 1
+        return within(number.digits, low, top if most is None or most >= number.high else most - number.low)
+
+    def _bound(self, element: XmlElement, port: str, ports: Mapping[str, str]) -> int | None:
+        if port not in element.attributes:
+            return None
+        value = self.value(element, port, ports)
+        if not _WHOLE.fullmatch(value):
+            message = f"the port '{port}' holds a whole number, not '{clip(value)}'"
+            raise unreadable(self._document, element, "BBT0604", message, attribute=port)
+        return int(value)
+
+    def condition(self, element: XmlElement, ports: Mapping[str, str]) -> Condition:
+        """What the leaf of a variable or a number asks. Raises :class:`Unreadable`."""
+        if self.is_number(element):
+            return self.number(element, ports)
+        return Is(self.variable(element, ports), Truth.TRUE)
+
     def action(self, element: XmlElement, ports: Mapping[str, str]) -> str:
         """The action that an action leaf runs. Raises :class:`Unreadable`."""
         name = self._ground(element, ports, "action")
@@ -103,7 +139,7 @@ class Leaves:
                 hint = f"it has no port '{clip(other)}'" if other is not None else None
                 raise unreadable(self._document, element, "BBT0603", message, attribute=other, hint=hint)
         for port in given:
-            if port not in wanted:
+            if port not in wanted and not (kind == "function" and port in BOUNDS):
                 message = f"'{clip(tag_of(element))}' has no port '{clip(port)}'"
                 hint = f"its ports: {', '.join(wanted)}" if wanted else "it has no ports"
                 raise unreadable(self._document, element, "BBT0603", message, attribute=port, hint=hint)
@@ -139,7 +175,7 @@ class Leaves:
             return [self._names.symbols[name]]
         ranks = self._possible.get(name, {})
         best: list[Symbol] = []
-        for kind in ("predicate", "action"):
+        for kind in ("predicate", "function", "action"):
             of_kind = {symbol: rank for symbol, rank in ranks.items() if symbol.kind == kind}
             best += [symbol for symbol, rank in of_kind.items() if rank == min(of_kind.values())]
         return best

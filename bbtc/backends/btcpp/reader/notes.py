@@ -23,7 +23,7 @@ from bbtc.ground.condition import TRUE
 from bbtc.ground.task import Task
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, PlanStatus, Tree, walk
 
-_KINDS: Mapping[str, Kind] = {"predicate": "predicate", "action": "action"}
+_KINDS: Mapping[str, Kind] = {"predicate": "predicate", "function": "function", "action": "action"}
 _STATUSES: Mapping[str, PlanStatus] = {status: status for status in get_args(PlanStatus)}
 _NUMBERED_ID = re.compile(r"n([0-9]{1,9})")
 
@@ -138,7 +138,7 @@ def _exact(task: Task, node: Node, note: Mapping[str, object]) -> Node:
         node = replace(node, template=template)
     if isinstance(node, ConditionNode) and "condition" in note:
         try:
-            condition = condition_from_json(At(note["condition"]), task.variable_index)
+            condition = condition_from_json(At(note["condition"]), task.variable_index, task.number_by_name)
         except Unreadable:
             return node
         if written(task, condition) == node.condition:

@@ -8,13 +8,13 @@ the shape lacks is nobody's, which :mod:`bbtc.backends.btcpp.reader.unread` repo
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, UNTIL_SUCCESS
+from bbtc.backends.btcpp.idioms import COMMITTED, HELD, HOLD_LABEL, LATCH, SKIPPER, TIMEOUT, UNTIL_SUCCESS
 from bbtc.backends.btcpp.xmltext import XmlElement
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
@@ -120,7 +120,9 @@ class Match:
                 found = pattern.fullmatch(value or "")
                 groups = {} if found is None else found.groupdict()
                 fits = found is not None and all(
-                    self.texts.setdefault(group, text) == text for group, text in groups.items()
+                    self.texts.setdefault(group, text) == text
+                    for group, text in groups.items()
+                    if text is not None
                 )
             case _:
                 assert_never(wanted)
@@ -136,6 +138,11 @@ def match(shape: Shape, element: XmlElement) -> Match | None:
     """An element as a shape; None if it has other elements."""
     found = Match(shape)
     return found if _fits(shape, element, found) else None
+
+
+def match_one(shapes: Iterable[Shape], element: XmlElement) -> Match | None:
+    """An element as the first of some shapes that fits."""
+    return next((found for shape in shapes if (found := match(shape, element)) is not None), None)
 
 
 def _fits(shape: Shape, element: XmlElement, found: Match) -> bool:
@@ -181,15 +188,93 @@ def _running(script: Value, leaf: Hole) -> Shape:
     return Shape("ReactiveSequence", {}, (_script(script), kept))
 
 
-_RAISED = Pattern(re.compile(rf"@(?P<flag>{_NAME.pattern}) := true"), "@acting := true")
-_RAISED_AND_STARTED = Pattern(
-    re.compile(rf"@(?P<flag>{_NAME.pattern}) := true; _started := 'yes'"),
-    "@acting := true; _started := 'yes'",
-)
+_RUNNING = rf"(?P<running>{_COUNTER})"
+_FLAG = rf"@(?P<flag>{_NAME.pattern})"
 _SUCCESS, _FAILURE = Shape("AlwaysSuccess", {}), Shape("AlwaysFailure", {})
 _EVENTS = ("_onSuccess", "_onFailure", "_onHalted")
+_UNKNOWN = Shape("KeepRunningUntilFailure", {}, (_SUCCESS,))
 
-UNTIL_BLOCKED = Shape(
+_ENDED = rf"(?P<ended>{_COUNTER})"
+_FREE = Pattern(re.compile(rf"!@(?P<flag>{_NAME.pattern})"), "!@acting")
+_ONCE = Shape(
+    "RunOnce",
+    {"then_skip": "false"},
+    (_script(Pattern(re.compile(rf"{_RUNNING} := false"), "@x_running := false")),),
+)
+_LIVE = Shape(
+    "Precondition",
+    {"if": Pattern(re.compile(rf"!{_RUNNING}"), "!@x_running"), "else": "SUCCESS"},
+    (
+        _script(
+            Pattern(re.compile(rf"(?P<live>{_COUNTER} := 'live'(?:; {_COUNTER} := 'live')*)"), "@x := 'live'")
+        ),
+    ),
+)
+_BLOCKED = Shape("Precondition", {"if": _FREE, "else": "RUNNING"}, (_FAILURE,))
+
+
+def _committed(*live: Shape) -> Shape:
+    begins = Pattern(re.compile(rf"@(?P<flag>{_NAME.pattern}) := {_RUNNING}"), "@acting := @x_running")
+    ends: dict[str, Value] = {
+        event: Pattern(re.compile(rf"{_ENDED} := '{status}'"), f"@x_ended := '{status}'")
+        for event, status in (("_onSuccess", "success"), ("_onFailure", "failure"))
+    }
+    told = Shape(
+        "ScriptCondition", {"code": Pattern(re.compile(rf"{_ENDED} == 'success'"), "@x_ended == 'success'")}
+    )
+    ticked = Shape(
+        "ReactiveSequence",
+        {},
+        (
+            _ONCE,
+            *live,
+            _script(begins),
+            Shape("ForceSuccess", {}, (Hole("tree", ends),)),
+            Shape("Precondition", {"if": _FREE, "else": "RUNNING"}, (told,)),
+        ),
+    )
+    return Shape(SKIPPER, {}, (ticked, _BLOCKED))
+
+
+UNTIL_BLOCKED = (_committed(_LIVE), _committed(), Shape(COMMITTED, {}, (Hole("tree"),)))
+"""The tree, and FAILURE where it is running and no action is; RUNNING where it has passed one by."""
+
+GATE = Shape("Precondition", {"if": _FREE, "else": "RUNNING"}, (_SUCCESS,))
+"""Nothing starts where an action was running when the tick began."""
+
+_ENTRY_IN_PORT = Pattern(re.compile(rf"\{{(?P<held>@?{_NAME.pattern})\}}"), "{held}")
+HELD_LEAF = (
+    Shape(
+        "Switch3",
+        {"variable": _ENTRY_IN_PORT, "case_1": "true", "case_2": "false", "case_3": "unknown"},
+        (_SUCCESS, _FAILURE, _UNKNOWN, Hole("leaf")),
+    ),
+    Shape(HELD, {}, (Hole("leaf"),)),
+)
+"""A leaf whose fact may be held, in an entry of the blackboard or by our node."""
+
+
+def _noted(value: str) -> Pattern:
+    return Pattern(re.compile(rf"(?P<held>@?{_NAME.pattern}) := '{value}'"), f"held := '{value}'")
+
+
+NOTE = Shape(
+    "ForceSuccess",
+    {},
+    (
+        Shape(
+            SKIPPER,
+            {},
+            (
+                Hole("leaf", {"_onSuccess": _noted("true"), "_onFailure": _noted("false")}),
+                _script(_noted("unknown")),
+            ),
+        ),
+    ),
+)
+"""Writes what a leaf reads to the entry of its fact."""
+
+NOT_COMMITTED = Shape(
     SKIPPER,
     {},
     (
@@ -201,14 +286,23 @@ UNTIL_BLOCKED = Shape(
                 Hole("tree"),
             ),
         ),
+        _BLOCKED,
+    ),
+)
+"""The same of files in which nothing is held while an action runs."""
+
+GIVEN_UP = Shape(
+    "ForceSuccess",
+    {},
+    (
         Shape(
-            "Precondition",
-            {"if": Pattern(re.compile(rf"!@(?P<flag>{_NAME.pattern})"), "!@acting"), "else": "RUNNING"},
-            (_FAILURE,),
+            TIMEOUT,
+            {"msec": Pattern(re.compile("(?P<msec>[0-9]{1,13})"), "30000")},
+            (Hole("leaf"),),
         ),
     ),
 )
-"""The tree, and FAILURE where it is running and no action is."""
+"""An action that is given up after some time, which counts as its end."""
 
 RETRY = Shape(
     "ReactiveSequence",
@@ -229,10 +323,6 @@ RETRY = Shape(
 """A node below which every action uses up an attempt."""
 
 _ENTRY = rf"(?P<entry>_latch|{_COUNTER})"
-
-
-def _latching(status: str) -> Pattern:
-    return Pattern(re.compile(rf"{_ENTRY} := '{status}'"), f"_latch := '{status}'")
 
 
 def _state(relation: str, word: str) -> Pattern:
@@ -278,39 +368,58 @@ TRIED = Shape(
 )
 """A node that tries its child again; scripts of the ReactiveFallback make all below forget."""
 
-_LATCHED = dict(zip(_EVENTS, map(_latching, ("success", "failure", "success")), strict=True))
-_RUN_LATCHED = _running(_RAISED, Hole("leaf", _LATCHED))
-_RUN_STARTED = _running(_RAISED_AND_STARTED, Hole("leaf", dict.fromkeys(_EVENTS, "_started := 'no'")))
 _SWITCH: dict[str, Value] = {
     "variable": Pattern(re.compile(rf"\{{{_ENTRY}\}}"), "{_latch}"),
     "case_1": "success",
     "case_2": "failure",
 }
-_ACTIONS: tuple[tuple[Shape, str | None], ...] = (
-    (Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, _RUN_LATCHED)), "_latch"),
-    (
-        Shape(
-            "Switch2", _SWITCH, (_SUCCESS, _FAILURE, Shape("Sequence", {}, (Holes("needed"), _RUN_LATCHED)))
-        ),
-        "_latch",
-    ),
-    (_running(_RAISED, Hole("leaf")), None),
-    (
-        Shape(
-            "ReactiveSequence",
-            {},
-            (
-                Shape(
-                    "Switch2",
-                    {"variable": "{_started}", "case_1": "yes", "case_2": "never"},
-                    (_SUCCESS, _FAILURE, Hole("ready")),
-                ),
-                *_RUN_STARTED.children,
+
+
+def _actions(*, committed: bool) -> tuple[tuple[Shape, str | None], ...]:
+    """The forms of actions, with the entry that they keep their status in. Where the tree is ``committed`` to
+    actions, they tell when they run."""
+
+    def tells(script: str, example: str, value: str) -> Pattern:
+        if committed:
+            return Pattern(
+                re.compile(rf"{script}; {_RUNNING} := {value}"), f"{example}; @x_running := {value}"
+            )
+        return Pattern(re.compile(script), example)
+
+    def ends(entry: str, example: str, statuses: tuple[str, str, str]) -> dict[str, Value]:
+        return {
+            event: tells(f"{entry} := '{status}'", f"{example} := '{status}'", "false")
+            for event, status in zip(_EVENTS, statuses, strict=True)
+        }
+
+    begins = tells(f"{_FLAG} := true", "@acting := true", "true")
+    started = Pattern(
+        re.compile(f"{begins.pattern.pattern}; _started := 'yes'"), f"{begins.example}; _started := 'yes'"
+    )
+    latched = _running(begins, Hole("leaf", ends(_ENTRY, "_latch", ("success", "failure", "success"))))
+    again = _running(started, Hole("leaf", ends("_started", "_started", ("no", "no", "no"))))
+    ready: dict[str, Value] = {"variable": "{_started}", "case_1": "yes", "case_2": "never"}
+    return (
+        (Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, latched)), "_latch"),
+        (
+            Shape(
+                "Switch2", _SWITCH, (_SUCCESS, _FAILURE, Shape("Sequence", {}, (Holes("needed"), latched)))
             ),
+            "_latch",
         ),
-        "_started",
-    ),
-)
+        (_running(begins, Hole("leaf")), None),
+        (
+            Shape(
+                "ReactiveSequence",
+                {},
+                (Shape("Switch2", ready, (_SUCCESS, _FAILURE, Hole("ready"))), *again.children),
+            ),
+            "_started",
+        ),
+    )
+
+
+_ACTIONS = tuple(zip(_actions(committed=True), _actions(committed=False), strict=True))
 
 KNOWN = Shape(SKIPPER, {}, (Shape("ForceSuccess", {}, (Hole("leaf"),)), _FAILURE))
 UNKNOWN = Shape(SKIPPER, {}, (Shape("ForceFailure", {}, (Hole("leaf"),)), _SUCCESS))
@@ -359,13 +468,17 @@ READ = frozenset(
     *(
         _tags(shape)
         for shape in (
-            UNTIL_BLOCKED,
+            *UNTIL_BLOCKED,
+            NOT_COMMITTED,
+            GATE,
+            *HELD_LEAF,
+            NOTE,
             RETRY,
             TRIED,
             KNOWN,
             UNKNOWN,
             REGISTER,
-            *(shape for shape, _ in _ACTIONS),
+            *(shape for shape, _ in _actions(committed=True)),
         )
     )
 )
@@ -379,7 +492,8 @@ READ = frozenset(
 class ActionParts:
     """What an action idiom is made of: its leaf, what must be true before it starts, the counters of
     attempts it uses, whether it keeps its status, the flag that tells that it runs, the entry of the
-    blackboard that it remembers its state in, and how it was recognised."""
+    blackboard that it remembers its state in, and how it was recognised; the notes of what it may set, or
+    the text that lists that, and whether it waits where another ran."""
 
     leaf: XmlElement
     guards: tuple[XmlElement, ...]
@@ -388,22 +502,30 @@ class ActionParts:
     flag: str
     entry: str | None
     found: Match
+    notes: tuple[XmlElement, ...] = ()
+    sets: str = ""
+    waits: bool = False
 
 
 def action_of(element: XmlElement) -> ActionParts | None:
     """The parts of an action idiom; None if this is none."""
     if has(element, LATCH) and element.children:
         return _latch(element)
-    for shape, keeps in _ACTIONS:
-        found = match(shape, element)
-        if found is None:
+    for forms in _ACTIONS:
+        ways = [(found, keeps) for shape, keeps in forms if (found := match(shape, element)) is not None]
+        if not ways:
             continue
+        found, keeps = min(ways, key=lambda way: bool(way[0].wrong))
         needed: Sequence[XmlElement] = found.parts.get("needed", [])
         if "ready" in found.parts:
             needed = _needed(found.part("ready"), found)
-        leaf, flag = found.part("leaf"), found.texts.get("flag", "")
+        leaf = found.part("leaf")
         entry = found.texts.get("entry", keeps)
-        return _parts(leaf, needed, found, latched=keeps == "_latch", flag=flag, entry=entry)
+        needed, notes, waits = _committing(needed, found)
+        parts = _parts(
+            leaf, needed, found, latched=keeps == "_latch", flag=found.texts.get("flag", ""), entry=entry
+        )
+        return replace(parts, notes=notes, waits=waits)
     return None
 
 
@@ -411,20 +533,58 @@ def _latch(element: XmlElement) -> ActionParts:
     found = Match(read=[(element, ())])
     keep = boolean_of(element.attributes.get("keep", "true"))
     flag = element.attributes.get("flag", "acting")
+    entry = element.attributes.get("entry")
     for name, fits, example in (
         ("keep", keep is not None, "true"),
         ("flag", _NAME.fullmatch(flag) is not None, "acting"),
+        ("entry", entry is None or _WORD.fullmatch(entry) is not None, "@x"),
+        ("sets", True, ""),
     ):
         if name in element.attributes:
             found.read.append((element, (name,)))
             if not fits:
                 found.wrong.append((element, name, example))
     *needed, leaf = element.children
-    return _parts(leaf, needed, found, latched=keep is not False, flag=flag, entry=None)
+    parts = _parts(leaf, needed, found, latched=keep is not False, flag=flag, entry=entry)
+    return replace(parts, sets=element.attributes.get("sets", ""), waits=True)
+
+
+def _committing(
+    needed: Sequence[XmlElement], found: Match
+) -> tuple[Sequence[XmlElement], tuple[XmlElement, ...], bool]:
+    """What stands before an action without what commits the tree to it: that it waits where another ran,
+    after its conditions, and notes of what it may set, at last."""
+    first = needed[0] if needed else None
+    if first is not None and has(first, "ReactiveSequence") and any(map(_is_gate, first.children[-1:])):
+        found.read.append((first, ()))
+        needed = [*first.children, *needed[1:]]
+    at = next((number for number, each in enumerate(needed) if _is_gate(each)), None)
+    gate = None if at is None else match(GATE, needed[at])
+    if at is not None and gate is not None:
+        found.read.extend(gate.read)
+        found.wrong.extend(gate.wrong)
+        if found.texts.setdefault("flag", gate.texts.get("flag", "")) != gate.texts.get("flag"):
+            found.wrong.append((needed[at], "if", f"!@{found.texts['flag']}"))
+        needed = [*needed[:at], *needed[at + 1 :]]
+    notes: tuple[XmlElement, ...] = ()
+    if needed and has(needed[-1], "ReactiveSequence") and needed[-1].attributes.get("name") == HOLD_LABEL:
+        found.read.append((needed[-1], ()))
+        notes, needed = tuple(needed[-1].children), needed[:-1]
+    return needed, notes, gate is not None
+
+
+def _is_gate(element: XmlElement) -> bool:
+    return match(GATE, element) is not None
 
 
 def _needed(ready: XmlElement, found: Match) -> Sequence[XmlElement]:
-    """What must succeed before an action starts: several nodes if the last of them uses up an attempt."""
+    """What must succeed before an action starts: several nodes if the first of them waits, or the last of
+    them uses up an attempt."""
+    if has(ready, "ReactiveSequence") and ready.children and not _is_gate(ready.children[-1]):
+        first = ready.children[0]
+        if _is_gate(first) or (has(first, "ReactiveSequence") and any(map(_is_gate, first.children[-1:]))):
+            found.read.append((ready, ()))
+            return ready.children
     if has(ready, "ReactiveSequence") and ready.children and has(ready.children[-1], "Script"):
         found.read.append((ready, ()))
         return ready.children

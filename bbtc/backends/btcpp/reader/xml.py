@@ -15,6 +15,7 @@ from itertools import islice
 
 from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.idioms import (
+    HELD,
     LATCH,
     SKIPPER_LABEL,
     UNTIL_SUCCESS,
@@ -22,14 +23,18 @@ from bbtc.backends.btcpp.idioms import (
     forgotten,
     full_again,
     is_retry_label,
+    milliseconds,
 )
 from bbtc.backends.btcpp.names import is_numeric, shown, without_number
 from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE
 from bbtc.backends.btcpp.reader.conditions import ConditionReader
+from bbtc.backends.btcpp.reader.holding import Holds
 from bbtc.backends.btcpp.reader.layout import Layout, is_port
 from bbtc.backends.btcpp.reader.leaves import Leaves
 from bbtc.backends.btcpp.reader.notes import Notes, read_notes, with_notes
 from bbtc.backends.btcpp.reader.patterns import (
+    GIVEN_UP,
+    NOT_COMMITTED,
     READ,
     REGISTER,
     RETRY,
@@ -42,6 +47,7 @@ from bbtc.backends.btcpp.reader.patterns import (
     has,
     is_skipper,
     match,
+    match_one,
     tag_of,
 )
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
@@ -67,6 +73,7 @@ _HINTS = {
     "SequenceWithMemory": "it has memory; a tree reads its conditions in every tick: use ReactiveSequence",
     "Fallback": "it has memory; a tree reads its conditions in every tick: use ReactiveFallback",
     UNTIL_SUCCESS: "alone, it does not end what is remembered below it: docs/export-btcpp.md has its form",
+    HELD: "it stands around one condition",
     "Parallel": 'only one with success_count="1" failure_count="1", a skipper, has a counterpart',
 }
 
@@ -145,7 +152,7 @@ def tree_from_btcpp(
     ]
     if problems:
         raise BbtcError(problems)
-    for doubt in reader.doubts():
+    for doubt in reader.doubts(tree):
         report.add(doubt)
     told = _TOLD.search(layout.trees[layout.main].attributes.get("_description", ""))
     return Imported(tree, notes.success_probability, None if told is None else Fraction(told.group(1)))
@@ -161,15 +168,18 @@ class _Reader:
         self._read = self._nodes = 0
         self.places: dict[int, XmlElement] = {}
         self._flag: str | None = None
+        self._running = ""
         self._counters: set[str] = set()
         self._entries: dict[tuple[str, str], XmlElement] = {}
         self._unread = Unread(self._document)
         self._leaves = Leaves(task, self._document, notes.names, self._unread)
+        self._holds = Holds(self._document, self._leaves)
         self._conditions = ConditionReader(
             task,
             self._document,
             self._leaves,
             self._unread,
+            self._holds,
             call=self._call,
             count=self._count,
         )
@@ -177,6 +187,7 @@ class _Reader:
     def raise_faults(self) -> None:
         """Raise :class:`BbtcError` if anything could not be read, or was not."""
         reachable = self._layout.reachable()
+        self._faults += islice(self._holds.faults(), _MOST_FAULTS)
         left = self._unread.left(reachable, whole=not self._faults)
         self._faults += islice(left, _MOST_FAULTS)
         if self._faults:
@@ -201,7 +212,7 @@ class _Reader:
             unique = {(d.span.start if d.span else 0, d.code, d.message): d for d in faults}
             raise BbtcError([unique[key] for key in sorted(unique)][:_MOST_FAULTS])
 
-    def doubts(self) -> Iterator[Diagnostic]:
+    def doubts(self, tree: Tree) -> Iterator[Diagnostic]:
         """What the file does that the tree does not tell, though it could be read."""
         called = {tree.attributes["ID"] for tree in self._layout.reachable()}
         spare = [name for name in self._layout.trees if name not in called]
@@ -215,6 +226,7 @@ class _Reader:
             hint = "export the tree anew: its branch 'until blocked' is missing in the file"
             place = self._document.span(self._layout.trees[self._layout.main])
             yield Diagnostic("BBT0620", message, place, hint)
+        yield from self._holds.doubts(tree)
 
     def place(self, root: Node, path: Sequence[str | int]) -> XmlElement:
         """The element that a node was read from."""
@@ -233,10 +245,12 @@ class _Reader:
         scope = Scope(trees=(self._layout.main,))
         try:
             content = self._enter(self._layout.main)
-            guard = match(UNTIL_BLOCKED, content)
+            guard = match_one((*UNTIL_BLOCKED, NOT_COMMITTED), content)
             if guard is not None:
                 self._unread.take(guard)
-                self._flag = guard.texts["flag"]
+                self._flag = guard.texts.get("flag", "acting")
+                self._running = guard.texts.get("running", "")
+                self._holds.set_back = frozenset(re.findall(r"@\w+", guard.texts.get("live", "")))
                 content = guard.part("tree")
         except Unreadable as found:
             raise BbtcError([found.diagnostic]) from None
@@ -279,6 +293,10 @@ class _Reader:
         given = [name for name in element.attributes if is_port(name)]
         self._unread.took(element, "ID", "_autoremap", *given)
         for name in given:
+            given_value = element.attributes[name]
+            if given_value.startswith("{@"):
+                ports[name] = given_value  # an entry of the root blackboard, for a fact that is held
+                continue
             ports[name] = self._leaves.value(element, name, scope.ports)
             if is_numeric(element.attributes[name]):
                 message = f"the number '{clip(element.attributes[name])}' may change its form in a SubTree"
@@ -499,13 +517,21 @@ class _Reader:
         """The action node of an idiom. ``element`` carries its label; the idiom itself may stand in a
         BehaviorTree, with a scope ``inside`` it."""
         self._unread.take(parts.found)
-        if self._leaves.is_leaf(parts.leaf) and not parts.leaf.children:
-            name = self._leaves.action(parts.leaf, inside.ports)
+        limited = match(GIVEN_UP, parts.leaf)
+        if limited is not None:
+            self._unread.take(limited)
+        leaf = parts.leaf if limited is None else limited.part("leaf")
+        if self._leaves.is_leaf(leaf) and not leaf.children:
+            name = self._leaves.action(leaf, inside.ports)
         else:
-            message, hint = self._no_counterpart(parts.leaf)
-            raise unreadable(self._document, parts.leaf, "BBT0616", message, hint=hint)
+            message, hint = self._no_counterpart(leaf)
+            raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
+        self._check_limit(leaf, None if limited is None else limited.texts["msec"], name)
         self._check_entries(element, parts, name, inside)
         guarded = yield self._guarded(parts, name, inside)
+        held = [fact for note in parts.notes for fact in self._conditions.note(note, inside)]
+        held += self._holds.listed(element, parts.sets, inside.ports)
+        self._holds.action(element, frozenset(held), parts.waits)
         if parts.counters != inside.counters:
             message = f"'{clip(name)}' must use up an attempt of each retry node around it, and of no other"
             hint = f"here: {', '.join(inside.counters) or 'none'}"
@@ -519,11 +545,34 @@ class _Reader:
         own = label if label and label != shown(auto) else None
         return ActionNode("", name, parts.latched, bool(guarded), own)
 
+    def _check_limit(self, leaf: XmlElement, found: str | None, name: str) -> None:
+        """An action is given up when the task says so, which its figures rest on."""
+        seconds = self._task.action_by_name[name].timeout
+        wanted = None if seconds is None else str(milliseconds(seconds))
+        if found == wanted:
+            return
+        if wanted is None:
+            message = f"'{clip(name)}' is given up after {found} ms, and has no time-out in the task"
+            hint = "say so in the domain: `:timeout`, in seconds"
+        else:
+            message = f"'{clip(name)}' has to be given up after {wanted} ms"
+            hint = f'<ForceSuccess><Timeout msec="{wanted}">…</Timeout></ForceSuccess> does so'
+        raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
+
     def _check_entries(self, element: XmlElement, parts: ActionParts, name: str, inside: Scope) -> None:
         """The entries of the blackboard through which an action speaks with the rest of the tree."""
         if self._flag is not None and parts.flag != self._flag:
             message = f"'{clip(name)}' sets '{clip(parts.flag)}', but the tree reads '{clip(self._flag)}'"
             hint = "the tree would be taken for blocked while the action runs"
+            raise unreadable(self._document, element, "BBT0616", message, hint=hint)
+        running = parts.found.texts.get("running", "")
+        if self._flag is not None and running != self._running and parts.found.shape is not None:
+            message = f"'{clip(name)}' does not tell that it runs by '{clip(self._running)}'"
+            if not self._running:
+                message = (
+                    f"'{clip(name)}' tells that it runs by '{clip(running)}', which the tree does not read"
+                )
+            hint = "the tree asks one entry whether an action runs"
             raise unreadable(self._document, element, "BBT0616", message, hint=hint)
         lasting = parts.entry is None or not parts.entry.startswith("@")
         if parts.latched and lasting != (not inside.forget):

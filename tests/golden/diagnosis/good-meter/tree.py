@@ -18,7 +18,7 @@ import random
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, cast, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -50,6 +50,7 @@ class Robot(Protocol):
 
 
 Fact = tuple[str, ...]
+R = TypeVar("R")
 
 
 def in_words(fact: Fact) -> str:
@@ -67,6 +68,31 @@ def all_of(*values: bool | None) -> bool | None:
 def negated(value: bool | None) -> bool | None:
     """Three-valued "not": unknown stays unknown."""
     return None if value is None else not value
+
+
+class View:
+    """A robot as the tree sees it: what is ``held``, by method and arguments, is not asked anew."""
+
+    def __init__(self, robot: Any, held: dict[Fact, Any] | None = None, path: str = "") -> None:
+        self.robot = robot
+        self.held: dict[Fact, Any] = {} if held is None else held
+        self.path = path
+
+    def __getattr__(self, name: str) -> Any:
+        method, path, held = getattr(self.robot, name), f"{self.path}{name}", self.held
+        if not callable(method):
+            return View(method, held, f"{path}.")
+
+        def ask(*args: str) -> Any:
+            key = (path, *args)
+            return held[key] if key in held else method(*args)
+
+        return ask
+
+
+def view(robot: R) -> R:
+    """The robot as the tree sees it."""
+    return cast("R", View(robot))
 
 
 class Condition(Behaviour):
@@ -107,7 +133,8 @@ class Latch(Decorator):
     """Runs its action once and returns how it ended at every later tick. The status is withheld
     until the next tick, because conditions to the left were read before the action's effect. An
     action interrupted after its start counts as run. A guard must be True for it to start; with
-    ``keep=False`` it starts again whenever it is ticked."""
+    ``keep=False`` it starts again whenever it is ticked. While it runs, the tree reads what is
+    its ``own``, which the action may itself set, as it was in the tick that started it."""
 
     def __init__(
         self,
@@ -116,10 +143,13 @@ class Latch(Decorator):
         cancel: Callable[[str], None],
         guard: Callable[[], bool | None] | None = None,
         keep: bool = True,
+        *,
+        own: Iterable[Fact] = (),
     ) -> None:
         super().__init__(name=name, child=Action(name, act, cancel))
         self._guard = guard
         self._keep = keep
+        self._own = own
         self._started = False
         self._final: Status | None = None
 
@@ -128,9 +158,18 @@ class Latch(Decorator):
             self.stop(self._final)
             yield self
             return
-        ready = True if self._started else self._ready()
+        root = self._root()
+        ready: bool | None = True
+        if not self._started:
+            ready = self._ready()
+            if ready and root is not None and root.committed:
+                # The tick has passed by an action that ran: what is held may be half changed.
+                ready = None
         if ready:
-            self._announce()
+            if not self._started:
+                self._use_up()
+            if root is not None:
+                root.acts(self, () if self._started else self._own)
             self._started = True
             yield from self.decorated.tick()
             if self.decorated.status != Status.RUNNING:
@@ -155,12 +194,19 @@ class Latch(Decorator):
         self.feedback_message = "" if ready else f"its precondition is {why}"
         return ready
 
-    def _announce(self) -> None:
+    def _use_up(self) -> None:
+        """The action starts."""
+
+    def _root(self) -> StopWhenBlocked | None:
         above = self.parent
         while above is not None and not isinstance(above, StopWhenBlocked):
             above = above.parent
-        if above is not None:
-            above.acts(self)
+        return above
+
+    @property
+    def running(self) -> bool:
+        """Has its action started, and neither ended nor been cancelled?"""
+        return self._started
 
     def _end(self, status: Status) -> None:
         self._started = False
@@ -219,7 +265,11 @@ class WithBeliefs(Protocol):
 
 
 class StopWhenBlocked(Decorator):
-    """The root: FAILURE where the tree is RUNNING but no action is. Something is unknown then that
+    """The root. It knows the action that runs, and holds what that may itself set, so that no
+    action ends by what it does. A tick that passes it by cancels it and is RUNNING; all is read
+    anew in the next one.
+
+    FAILURE where the tree is RUNNING but no action is. Something is unknown then that
     nothing can observe, and nothing would ever change. Before its first tick the tree waits,
     however long, until the robot has heard of every fact in ``reads``, which tells for each whether
     it can be unknown."""
@@ -231,11 +281,14 @@ class StopWhenBlocked(Decorator):
         reads: Mapping[Fact, bool] | None = None,
     ) -> None:
         super().__init__(name="stop when blocked", child=child)
-        self._robot = robot
+        self._view = robot if isinstance(robot, View) else View(robot)
+        self._robot: object = self._view.robot
         self._reads = dict(reads or {})
         self._said: float | None = None
         self._acting = False
         self._last: Latch | None = None
+        self.committed = False
+        """Was an action running when the tick began?"""
 
     def setup(self, **kwargs: Any) -> None:
         if isinstance(self._robot, WithSetup):
@@ -246,13 +299,13 @@ class StopWhenBlocked(Decorator):
         if self.status == Status.RUNNING:
             self.stop(Status.INVALID)
 
-    def acts(self, latch: Latch) -> None:
-        """A latch below is about to run its action in this tick."""
-        # py_trees would interrupt the action that ran before only after this one has started: the
-        # robot, asked for the same action by both, could not tell the second from the first.
-        last = self._last
-        if last is not None and last is not latch and last.status == Status.RUNNING:
-            last.stop(Status.INVALID)
+    def acts(self, latch: Latch, own: Iterable[Fact]) -> None:
+        """A latch below is about to run its action in this tick, after it notes its ``own``."""
+        for fact in own:
+            ask: Any = self._robot
+            for name in fact[0].split("."):
+                ask = getattr(ask, name)
+            self._view.held[fact] = ask(*fact[1:])
         self._last = latch
         self._acting = True
 
@@ -263,6 +316,9 @@ class StopWhenBlocked(Decorator):
             return
         self._reads.clear()
         self._acting = False
+        self.committed = self._last is not None and self._last.running
+        if not self.committed:
+            self._view.held.clear()
         yield from super().tick()
 
     def _waits(self) -> bool:
@@ -278,6 +334,11 @@ class StopWhenBlocked(Decorator):
         return bool(missing)
 
     def update(self) -> Status:
+        if self.committed and not self._acting:
+            if self._last is not None and self._last.running:
+                self._last.stop(Status.INVALID)
+            self.feedback_message = "" if self._last is None else f"{self._last.name}: cancelled"
+            return Status.RUNNING
         if self.decorated.status == Status.RUNNING and not self._acting:
             self.feedback_message = "blocked: nothing can observe what is unknown" + self._refused()
             return Status.FAILURE
@@ -310,6 +371,7 @@ def run(root: Behaviour, period: float = 0.0) -> Status:
 
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
+    robot = view(robot)
     return StopOutside(
         robot,
         fallback(
@@ -331,12 +393,14 @@ def create_root(robot: Robot) -> Behaviour:
                         *watched(robot, ("measure", "cable"), lambda: robot.measure("cable")),
                         guard=lambda: robot.monitor.value("faulty", "cable") is None,
                         keep=False,
+                        own=OWN["measure(cable)"],
                     ),
                     Latch(
                         "measure(motor)",
                         *watched(robot, ("measure", "motor"), lambda: robot.measure("motor")),
                         guard=lambda: robot.monitor.value("faulty", "motor") is None,
                         keep=False,
+                        own=OWN["measure(motor)"],
                     ),
                 ),
             ),
@@ -347,6 +411,7 @@ def create_root(robot: Robot) -> Behaviour:
                     "swap(cable)",
                     *watched(robot, ("swap", "cable"), lambda: robot.swap("cable")),
                     keep=False,
+                    own=OWN["swap(cable)"],
                 ),
             ),
             sequence(
@@ -356,12 +421,14 @@ def create_root(robot: Robot) -> Behaviour:
                     "swap(motor)",
                     *watched(robot, ("swap", "motor"), lambda: robot.swap("motor")),
                     keep=False,
+                    own=OWN["swap(motor)"],
                 ),
             ),
             Latch(
                 "swap(sensor)",
                 *watched(robot, ("swap", "sensor"), lambda: robot.swap("sensor")),
                 keep=False,
+                own=OWN["swap(sensor)"],
             ),
         ),
         READS,
@@ -630,7 +697,7 @@ class StopOutside(StopWhenBlocked):
         self, robot: WithMonitor, child: Behaviour, reads: Mapping[Fact, bool] | None = None
     ) -> None:
         super().__init__(robot, child, reads)
-        self._watching = robot
+        self._watching = cast("WithMonitor", self._robot)
 
     def tick(self) -> Iterator[Behaviour]:
         monitor = self._watching.monitor
@@ -723,6 +790,36 @@ class HiddenWorld(World):
 
 READS: dict[Fact, bool] = {}
 """The facts that the tree reads, and whether they can be unknown."""
+
+
+OWN: dict[str, list[Fact]] = {
+    "measure(cable)": [
+        ("monitor.value", "faulty", "cable"),
+        ("monitor.value", "faulty", "motor"),
+        ("monitor.value", "faulty", "sensor"),
+    ],
+    "measure(motor)": [
+        ("monitor.value", "faulty", "cable"),
+        ("monitor.value", "faulty", "motor"),
+        ("monitor.value", "faulty", "sensor"),
+    ],
+    "swap(cable)": [
+        ("monitor.value", "faulty", "cable"),
+        ("monitor.value", "faulty", "motor"),
+        ("monitor.value", "faulty", "sensor"),
+    ],
+    "swap(motor)": [
+        ("monitor.value", "faulty", "cable"),
+        ("monitor.value", "faulty", "motor"),
+        ("monitor.value", "faulty", "sensor"),
+    ],
+    "swap(sensor)": [
+        ("monitor.value", "faulty", "cable"),
+        ("monitor.value", "faulty", "motor"),
+        ("monitor.value", "faulty", "sensor"),
+    ],
+}
+"""What the tree reads and an action may itself set: held while it runs."""
 
 
 INITIAL: list[tuple[str, State]] = [("1", {})]

@@ -16,9 +16,9 @@ import argparse
 import math
 import random
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, cast, runtime_checkable
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -103,6 +103,7 @@ class Robot(Protocol):
 
 
 Fact = tuple[str, ...]
+R = TypeVar("R")
 
 
 def in_words(fact: Fact) -> str:
@@ -127,6 +128,31 @@ def any_of(*values: bool | None) -> bool | None:
 def negated(value: bool | None) -> bool | None:
     """Three-valued "not": unknown stays unknown."""
     return None if value is None else not value
+
+
+class View:
+    """A robot as the tree sees it: what is ``held``, by method and arguments, is not asked anew."""
+
+    def __init__(self, robot: Any, held: dict[Fact, Any] | None = None, path: str = "") -> None:
+        self.robot = robot
+        self.held: dict[Fact, Any] = {} if held is None else held
+        self.path = path
+
+    def __getattr__(self, name: str) -> Any:
+        method, path, held = getattr(self.robot, name), f"{self.path}{name}", self.held
+        if not callable(method):
+            return View(method, held, f"{path}.")
+
+        def ask(*args: str) -> Any:
+            key = (path, *args)
+            return held[key] if key in held else method(*args)
+
+        return ask
+
+
+def view(robot: R) -> R:
+    """The robot as the tree sees it."""
+    return cast("R", View(robot))
 
 
 class Condition(Behaviour):
@@ -167,7 +193,8 @@ class Latch(Decorator):
     """Runs its action once and returns how it ended at every later tick. The status is withheld
     until the next tick, because conditions to the left were read before the action's effect. An
     action interrupted after its start counts as run. A guard must be True for it to start; with
-    ``keep=False`` it starts again whenever it is ticked."""
+    ``keep=False`` it starts again whenever it is ticked. While it runs, the tree reads what is
+    its ``own``, which the action may itself set, as it was in the tick that started it."""
 
     def __init__(
         self,
@@ -176,10 +203,13 @@ class Latch(Decorator):
         cancel: Callable[[str], None],
         guard: Callable[[], bool | None] | None = None,
         keep: bool = True,
+        *,
+        own: Iterable[Fact] = (),
     ) -> None:
         super().__init__(name=name, child=Action(name, act, cancel))
         self._guard = guard
         self._keep = keep
+        self._own = own
         self._started = False
         self._final: Status | None = None
 
@@ -188,9 +218,18 @@ class Latch(Decorator):
             self.stop(self._final)
             yield self
             return
-        ready = True if self._started else self._ready()
+        root = self._root()
+        ready: bool | None = True
+        if not self._started:
+            ready = self._ready()
+            if ready and root is not None and root.committed:
+                # The tick has passed by an action that ran: what is held may be half changed.
+                ready = None
         if ready:
-            self._announce()
+            if not self._started:
+                self._use_up()
+            if root is not None:
+                root.acts(self, () if self._started else self._own)
             self._started = True
             yield from self.decorated.tick()
             if self.decorated.status != Status.RUNNING:
@@ -215,12 +254,19 @@ class Latch(Decorator):
         self.feedback_message = "" if ready else f"its precondition is {why}"
         return ready
 
-    def _announce(self) -> None:
+    def _use_up(self) -> None:
+        """The action starts."""
+
+    def _root(self) -> StopWhenBlocked | None:
         above = self.parent
         while above is not None and not isinstance(above, StopWhenBlocked):
             above = above.parent
-        if above is not None:
-            above.acts(self)
+        return above
+
+    @property
+    def running(self) -> bool:
+        """Has its action started, and neither ended nor been cancelled?"""
+        return self._started
 
     def _end(self, status: Status) -> None:
         self._started = False
@@ -254,7 +300,11 @@ class WithBeliefs(Protocol):
 
 
 class StopWhenBlocked(Decorator):
-    """The root: FAILURE where the tree is RUNNING but no action is. Something is unknown then that
+    """The root. It knows the action that runs, and holds what that may itself set, so that no
+    action ends by what it does. A tick that passes it by cancels it and is RUNNING; all is read
+    anew in the next one.
+
+    FAILURE where the tree is RUNNING but no action is. Something is unknown then that
     nothing can observe, and nothing would ever change. Before its first tick the tree waits,
     however long, until the robot has heard of every fact in ``reads``, which tells for each whether
     it can be unknown."""
@@ -266,11 +316,14 @@ class StopWhenBlocked(Decorator):
         reads: Mapping[Fact, bool] | None = None,
     ) -> None:
         super().__init__(name="stop when blocked", child=child)
-        self._robot = robot
+        self._view = robot if isinstance(robot, View) else View(robot)
+        self._robot: object = self._view.robot
         self._reads = dict(reads or {})
         self._said: float | None = None
         self._acting = False
         self._last: Latch | None = None
+        self.committed = False
+        """Was an action running when the tick began?"""
 
     def setup(self, **kwargs: Any) -> None:
         if isinstance(self._robot, WithSetup):
@@ -281,13 +334,13 @@ class StopWhenBlocked(Decorator):
         if self.status == Status.RUNNING:
             self.stop(Status.INVALID)
 
-    def acts(self, latch: Latch) -> None:
-        """A latch below is about to run its action in this tick."""
-        # py_trees would interrupt the action that ran before only after this one has started: the
-        # robot, asked for the same action by both, could not tell the second from the first.
-        last = self._last
-        if last is not None and last is not latch and last.status == Status.RUNNING:
-            last.stop(Status.INVALID)
+    def acts(self, latch: Latch, own: Iterable[Fact]) -> None:
+        """A latch below is about to run its action in this tick, after it notes its ``own``."""
+        for fact in own:
+            ask: Any = self._robot
+            for name in fact[0].split("."):
+                ask = getattr(ask, name)
+            self._view.held[fact] = ask(*fact[1:])
         self._last = latch
         self._acting = True
 
@@ -298,6 +351,9 @@ class StopWhenBlocked(Decorator):
             return
         self._reads.clear()
         self._acting = False
+        self.committed = self._last is not None and self._last.running
+        if not self.committed:
+            self._view.held.clear()
         yield from super().tick()
 
     def _waits(self) -> bool:
@@ -313,6 +369,11 @@ class StopWhenBlocked(Decorator):
         return bool(missing)
 
     def update(self) -> Status:
+        if self.committed and not self._acting:
+            if self._last is not None and self._last.running:
+                self._last.stop(Status.INVALID)
+            self.feedback_message = "" if self._last is None else f"{self._last.name}: cancelled"
+            return Status.RUNNING
         if self.decorated.status == Status.RUNNING and not self._acting:
             self.feedback_message = "blocked: nothing can observe what is unknown" + self._refused()
             return Status.FAILURE
@@ -345,6 +406,7 @@ def run(root: Behaviour, period: float = 0.0) -> Status:
 
 def create_root(robot: Robot) -> Behaviour:
     """The tree. Latches stay latched, so it runs once: make a new one for another run."""
+    robot = view(robot)
     return StopWhenBlocked(
         robot,
         fallback(
@@ -359,6 +421,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: negated(robot.lift_works()),
                 keep=False,
+                own=OWN["report_lift()"],
             ),
             Latch(
                 "charge(hall)",
@@ -366,6 +429,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("hall"), robot.battery_low()),
                 keep=False,
+                own=OWN["charge(hall)"],
             ),
             Latch(
                 "charge(landing)",
@@ -373,6 +437,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("landing"), robot.battery_low()),
                 keep=False,
+                own=OWN["charge(landing)"],
             ),
             Latch(
                 "push(surgery_door,surgery)",
@@ -387,6 +452,7 @@ def create_root(robot: Robot) -> Behaviour:
                     ),
                 ),
                 keep=False,
+                own=OWN["push(surgery_door,surgery)"],
             ),
             Latch(
                 "look_for(olga,children)",
@@ -394,6 +460,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("children"), robot.present("olga") is None),
                 keep=False,
+                own=OWN["look_for(olga,children)"],
             ),
             Latch(
                 "page(olga,children)",
@@ -401,6 +468,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("children"), negated(robot.present("olga"))),
                 keep=False,
+                own=OWN["page(olga,children)"],
             ),
             Latch(
                 "push(children_door,landing)",
@@ -415,6 +483,7 @@ def create_root(robot: Robot) -> Behaviour:
                     ),
                 ),
                 keep=False,
+                own=OWN["push(children_door,landing)"],
             ),
             Latch(
                 "look_for(pavel,surgery)",
@@ -422,6 +491,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("surgery"), robot.present("pavel") is None),
                 keep=False,
+                own=OWN["look_for(pavel,surgery)"],
             ),
             Latch(
                 "page(pavel,surgery)",
@@ -429,6 +499,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("surgery"), negated(robot.present("pavel"))),
                 keep=False,
+                own=OWN["page(pavel,surgery)"],
             ),
             Latch(
                 "pick_up(saline,hall)",
@@ -442,6 +513,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.battery_low()),
                 ),
                 keep=False,
+                own=OWN["pick_up(saline,hall)"],
             ),
             Latch(
                 "call_lift(hall)",
@@ -453,6 +525,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.lift_at("hall")),
                 ),
                 keep=False,
+                own=OWN["call_lift(hall)"],
             ),
             Latch(
                 "hand_over(insulin,olga,children)",
@@ -464,6 +537,7 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.present("olga"),
                 ),
                 keep=False,
+                own=OWN["hand_over(insulin,olga,children)"],
             ),
             Latch(
                 "ring(children_door,landing)",
@@ -475,6 +549,7 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.bolted("children_door"),
                 ),
                 keep=False,
+                own=OWN["ring(children_door,landing)"],
             ),
             Latch(
                 "hand_over(saline,pavel,surgery)",
@@ -486,6 +561,7 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.present("pavel"),
                 ),
                 keep=False,
+                own=OWN["hand_over(saline,pavel,surgery)"],
             ),
             sequence(
                 "for at(landing)",
@@ -501,6 +577,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.battery_low()),
                     ),
                     keep=False,
+                    own=OWN["ride(hall,landing)"],
                 ),
             ),
             Latch(
@@ -515,6 +592,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.battery_low()),
                 ),
                 keep=False,
+                own=OWN["pick_up(insulin,children)"],
             ),
             Latch(
                 "drive(children_door,children,landing)",
@@ -522,6 +600,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("children"), robot.open("children_door")),
                 keep=False,
+                own=OWN["drive(children_door,children,landing)"],
             ),
             Latch(
                 "push(children_door,children)",
@@ -536,6 +615,7 @@ def create_root(robot: Robot) -> Behaviour:
                     ),
                 ),
                 keep=False,
+                own=OWN["push(children_door,children)"],
             ),
             Latch(
                 "ring(surgery_door,surgery)",
@@ -547,6 +627,7 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.bolted("surgery_door"),
                 ),
                 keep=False,
+                own=OWN["ring(surgery_door,surgery)"],
             ),
             Latch(
                 "ring(children_door,children)",
@@ -558,6 +639,7 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.bolted("children_door"),
                 ),
                 keep=False,
+                own=OWN["ring(children_door,children)"],
             ),
             sequence(
                 "sequence",
@@ -570,6 +652,7 @@ def create_root(robot: Robot) -> Behaviour:
                         robot.cancel,
                         guard=lambda: all_of(robot.at("hall"), robot.open("surgery_door")),
                         keep=False,
+                        own=OWN["drive(surgery_door,hall,surgery)"],
                     ),
                     Latch(
                         "push(surgery_door,hall)",
@@ -584,6 +667,7 @@ def create_root(robot: Robot) -> Behaviour:
                             ),
                         ),
                         keep=False,
+                        own=OWN["push(surgery_door,hall)"],
                     ),
                 ),
             ),
@@ -596,6 +680,7 @@ def create_root(robot: Robot) -> Behaviour:
                     robot.cancel,
                     guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
                     keep=False,
+                    own=OWN["drive(children_door,landing,children)"],
                 ),
             ),
             Latch(
@@ -610,6 +695,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.battery_low()),
                 ),
                 keep=False,
+                own=OWN["pick_up(saline,surgery)"],
             ),
             Latch(
                 "drive(surgery_door,surgery,hall)",
@@ -617,6 +703,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("surgery"), robot.open("surgery_door")),
                 keep=False,
+                own=OWN["drive(surgery_door,surgery,hall)"],
             ),
             Latch(
                 "call_lift(landing)",
@@ -628,6 +715,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.lift_at("landing")),
                 ),
                 keep=False,
+                own=OWN["call_lift(landing)"],
             ),
             sequence(
                 "for on_tray(insulin)",
@@ -644,6 +732,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.battery_low()),
                     ),
                     keep=False,
+                    own=OWN["pick_up(insulin,hall)"],
                 ),
             ),
             sequence(
@@ -665,6 +754,7 @@ def create_root(robot: Robot) -> Behaviour:
                         robot.bolted("surgery_door"),
                     ),
                     keep=False,
+                    own=OWN["ring(surgery_door,hall)"],
                 ),
             ),
             Latch(
@@ -678,6 +768,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.battery_low()),
                 ),
                 keep=False,
+                own=OWN["ride(hall,landing)"],
             ),
             sequence(
                 "for at(hall)",
@@ -699,6 +790,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.battery_low()),
                     ),
                     keep=False,
+                    own=OWN["ride(landing,hall)"],
                 ),
             ),
             Latch(
@@ -707,6 +799,7 @@ def create_root(robot: Robot) -> Behaviour:
                 robot.cancel,
                 guard=lambda: all_of(robot.at("landing"), robot.open("children_door")),
                 keep=False,
+                own=OWN["drive(children_door,landing,children)"],
             ),
         ),
         READS,
@@ -840,6 +933,80 @@ READS: dict[Fact, bool] = {
     ("present", "pavel"): True,
 }
 """The facts that the tree reads, and whether they can be unknown."""
+
+
+OWN: dict[str, list[Fact]] = {
+    "call_lift(hall)": [("lift_at", "hall"), ("lift_at", "landing"), ("lift_works",)],
+    "call_lift(landing)": [("lift_at", "hall"), ("lift_at", "landing"), ("lift_works",)],
+    "charge(hall)": [("battery_low",)],
+    "charge(landing)": [("battery_low",)],
+    "drive(children_door,children,landing)": [
+        ("at", "children"),
+        ("at", "landing"),
+        ("battery_low",),
+        ("open", "children_door"),
+    ],
+    "drive(children_door,landing,children)": [
+        ("at", "children"),
+        ("at", "landing"),
+        ("battery_low",),
+        ("open", "children_door"),
+    ],
+    "drive(surgery_door,hall,surgery)": [
+        ("at", "hall"),
+        ("at", "surgery"),
+        ("battery_low",),
+        ("open", "surgery_door"),
+    ],
+    "drive(surgery_door,surgery,hall)": [
+        ("at", "hall"),
+        ("at", "surgery"),
+        ("battery_low",),
+        ("open", "surgery_door"),
+    ],
+    "hand_over(insulin,olga,children)": [
+        ("given", "insulin"),
+        ("on_tray", "insulin"),
+        ("present", "olga"),
+    ],
+    "hand_over(saline,pavel,surgery)": [
+        ("given", "saline"),
+        ("on_tray", "saline"),
+        ("present", "pavel"),
+    ],
+    "look_for(olga,children)": [("present", "olga")],
+    "look_for(pavel,surgery)": [("present", "pavel")],
+    "page(olga,children)": [("present", "olga")],
+    "page(pavel,surgery)": [("present", "pavel")],
+    "pick_up(insulin,children)": [("on_tray", "insulin")],
+    "pick_up(insulin,hall)": [("on_tray", "insulin")],
+    "pick_up(saline,hall)": [("on_tray", "saline")],
+    "pick_up(saline,surgery)": [("on_tray", "saline")],
+    "push(children_door,children)": [("bolted", "children_door"), ("open", "children_door")],
+    "push(children_door,landing)": [("bolted", "children_door"), ("open", "children_door")],
+    "push(surgery_door,hall)": [("bolted", "surgery_door"), ("open", "surgery_door")],
+    "push(surgery_door,surgery)": [("bolted", "surgery_door"), ("open", "surgery_door")],
+    "report_lift()": [("lift_works",)],
+    "ride(hall,landing)": [
+        ("at", "hall"),
+        ("at", "landing"),
+        ("lift_at", "hall"),
+        ("lift_at", "landing"),
+        ("lift_works",),
+    ],
+    "ride(landing,hall)": [
+        ("at", "hall"),
+        ("at", "landing"),
+        ("lift_at", "hall"),
+        ("lift_at", "landing"),
+        ("lift_works",),
+    ],
+    "ring(children_door,children)": [("bolted", "children_door"), ("open", "children_door")],
+    "ring(children_door,landing)": [("bolted", "children_door"), ("open", "children_door")],
+    "ring(surgery_door,hall)": [("bolted", "surgery_door"), ("open", "surgery_door")],
+    "ring(surgery_door,surgery)": [("bolted", "surgery_door"), ("open", "surgery_door")],
+}
+"""What the tree reads and an action may itself set: held while it runs."""
 
 
 INITIAL: list[tuple[str, State]] = [

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing_extensions import assert_never
 
 from bbtc.ground import task as gt
-from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or
+from bbtc.ground.condition import And, Condition, Constant, Is, Known, Not, Or, Within
 from bbtc.ground.effects import arrange
 from bbtc.markov import distribution
 
@@ -53,6 +53,8 @@ class Renumbering:
                 return Is(self.renumber[variable], value)
             case Known(variable):
                 return Known(self.renumber[variable])
+            case Within(digits):
+                return replace(condition, digits=tuple(self.renumber[digit] for digit in digits))
             case And(parts):
                 return And(tuple(self.condition(part) for part in parts))
             case Or(parts):
@@ -81,7 +83,17 @@ class Renumbering:
                 effects.append(gt.Effect(when, sets))
         factors = self.factors(outcome.factors)
         charges = tuple(replace(charge, when=self.condition(charge.when)) for charge in outcome.charges)
-        return replace(outcome, effects=tuple(effects), factors=factors, charges=charges)
+        changes = tuple(
+            self._change(change) for change in outcome.changes if change.digits[0] in self.renumber
+        )
+        return replace(outcome, effects=tuple(effects), factors=factors, charges=charges, changes=changes)
+
+    def _change(self, change: gt.NumberChange) -> gt.NumberChange:
+        cases = (
+            case if case.when is None else replace(case, when=self.condition(case.when))
+            for case in change.cases
+        )
+        return gt.NumberChange(tuple(self.renumber[digit] for digit in change.digits), tuple(cases))
 
     def action(self, action: gt.GroundAction) -> gt.GroundAction:
         """The action over the kept variables."""

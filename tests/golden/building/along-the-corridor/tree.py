@@ -1,0 +1,1284 @@
+"""Behavior tree for the problem along-the-corridor of the domain building. Made by bbtc.
+
+In the model of that domain it succeeds with probability 1.
+Nothing bounds how often it tries: with a robot that always fails, it never ends.
+Implement the class Robot, and run
+
+    run(create_root(MyRobot()), period=0.1)
+
+As a program, this module runs the tree in a simulated world (--help tells how).
+It needs py_trees 2.2 or later.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from fractions import Fraction
+from typing import Any, Protocol, TypeVar, cast, runtime_checkable
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Selector, Sequence
+from py_trees.decorators import Decorator
+from py_trees.trees import BehaviourTree
+
+
+class Robot(Protocol):
+    """What the tree needs of a robot.
+
+    A condition answers at once: True, False, or None where it is unknown. An action is called in
+    every tick while it runs and answers at once with its status: RUNNING, and SUCCESS when the
+    conditions show what it did.
+    """
+
+    def cancel(self, action: str) -> None:
+        """The running action, named as in the tree, is no longer wanted."""
+
+    def battery(self) -> int | None:
+        """The value of battery(); None where that is unknown."""
+
+    def at(self, place: str) -> bool | None:
+        """Whether at(place) holds."""
+
+    def crowded(self, place: str) -> bool | None:
+        """Whether crowded(place) holds."""
+
+    def delivered(self) -> bool | None:
+        """Whether delivered() holds."""
+
+    def loaded(self) -> bool | None:
+        """Whether loaded() holds."""
+
+    def open(self, door: str) -> bool | None:
+        """Whether open(door) holds."""
+
+    def charge(self, place: str) -> Status:
+        """Start or continue charge(place)."""
+
+    def drive(self, arg_from: str, to: str) -> Status:
+        """Start or continue drive(arg_from, to)."""
+
+    def hand_over(self, place: str) -> Status:
+        """Start or continue hand-over(place)."""
+
+    def load(self, place: str) -> Status:
+        """Start or continue load(place)."""
+
+    def do_pass(self, door: str, arg_from: str, to: str) -> Status:
+        """Start or continue pass(door, arg_from, to)."""
+
+    def push(self, door: str, arg_from: str, to: str) -> Status:
+        """Start or continue push(door, arg_from, to)."""
+
+    def wait(self) -> Status:
+        """Start or continue wait()."""
+
+
+Fact = tuple[str, ...]
+R = TypeVar("R")
+
+
+def in_words(fact: Fact) -> str:
+    """``predicate(object,…)``."""
+    return f"{fact[0]}({','.join(fact[1:])})"
+
+
+def all_of(*values: bool | None) -> bool | None:
+    """Three-valued "and": False if any value is False, else None if any is unknown, else True."""
+    if False in values:
+        return False
+    return None if None in values else True
+
+
+def negated(value: bool | None) -> bool | None:
+    """Three-valued "not": unknown stays unknown."""
+    return None if value is None else not value
+
+
+class View:
+    """A robot as the tree sees it: what is ``held``, by method and arguments, is not asked anew."""
+
+    def __init__(self, robot: Any, held: dict[Fact, Any] | None = None, path: str = "") -> None:
+        self.robot = robot
+        self.held: dict[Fact, Any] = {} if held is None else held
+        self.path = path
+
+    def __getattr__(self, name: str) -> Any:
+        method, path, held = getattr(self.robot, name), f"{self.path}{name}", self.held
+        if not callable(method):
+            return View(method, held, f"{path}.")
+
+        def ask(*args: str) -> Any:
+            key = (path, *args)
+            return held[key] if key in held else method(*args)
+
+        return ask
+
+
+def view(robot: R) -> R:
+    """The robot as the tree sees it."""
+    return cast("R", View(robot))
+
+
+class Condition(Behaviour):
+    """SUCCESS, FAILURE or RUNNING for a condition that is True, False or None (unknown)."""
+
+    def __init__(self, name: str, read: Callable[[], bool | None]) -> None:
+        super().__init__(name=name)
+        self._read = read
+
+    def update(self) -> Status:
+        value = self._read()
+        self.feedback_message = "unknown" if value is None else ""
+        if value is None:
+            return Status.RUNNING
+        return Status.SUCCESS if value else Status.FAILURE
+
+
+class Action(Behaviour):
+    """Calls the robot at every tick until the action ends; cancels it if it is no longer wanted."""
+
+    def __init__(self, name: str, act: Callable[[], Status], cancel: Callable[[str], None]) -> None:
+        super().__init__(name=name)
+        self._act = act
+        self._cancel = cancel
+
+    def update(self) -> Status:
+        status = self._act()
+        if status not in (Status.SUCCESS, Status.FAILURE, Status.RUNNING):
+            raise TypeError(f"{self.name} returned {status!r}, not SUCCESS, FAILURE or RUNNING")
+        return status
+
+    def terminate(self, new_status: Status) -> None:
+        if self.status == Status.RUNNING and new_status == Status.INVALID:
+            self._cancel(self.name)
+
+
+class Latch(Decorator):
+    """Runs its action once and returns how it ended at every later tick. The status is withheld
+    until the next tick, because conditions to the left were read before the action's effect. An
+    action interrupted after its start counts as run. A guard must be True for it to start; with
+    ``keep=False`` it starts again whenever it is ticked. While it runs, the tree reads what is
+    its ``own``, which the action may itself set, as it was in the tick that started it."""
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[], Status],
+        cancel: Callable[[str], None],
+        guard: Callable[[], bool | None] | None = None,
+        keep: bool = True,
+        *,
+        own: Iterable[Fact] = (),
+    ) -> None:
+        super().__init__(name=name, child=Action(name, act, cancel))
+        self._guard = guard
+        self._keep = keep
+        self._own = own
+        self._started = False
+        self._final: Status | None = None
+
+    def tick(self) -> Iterator[Behaviour]:
+        if self._final is not None:
+            self.stop(self._final)
+            yield self
+            return
+        root = self._root()
+        ready: bool | None = True
+        if not self._started:
+            ready = self._ready()
+            if ready and root is not None and root.committed:
+                # The tick has passed by an action that ran: what is held may be half changed.
+                ready = None
+        if ready:
+            if not self._started:
+                self._use_up()
+            if root is not None:
+                root.acts(self, () if self._started else self._own)
+            self._started = True
+            yield from self.decorated.tick()
+            if self.decorated.status != Status.RUNNING:
+                self._end(self.decorated.status)
+        if ready or ready is None:
+            self.status = Status.RUNNING
+        else:
+            self.stop(Status.FAILURE)
+        yield self
+
+    def update(self) -> Status:
+        return self.status
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status == Status.INVALID and self._started:
+            self._end(Status.SUCCESS)
+
+    def _ready(self) -> bool | None:
+        """Whether the action may start now."""
+        ready = True if self._guard is None else self._guard()
+        why = "unknown" if ready is None else "false"
+        self.feedback_message = "" if ready else f"its precondition is {why}"
+        return ready
+
+    def _use_up(self) -> None:
+        """The action starts."""
+
+    def _root(self) -> StopWhenBlocked | None:
+        above = self.parent
+        while above is not None and not isinstance(above, StopWhenBlocked):
+            above = above.parent
+        return above
+
+    @property
+    def running(self) -> bool:
+        """Has its action started, and neither ended nor been cancelled?"""
+        return self._started
+
+    def _end(self, status: Status) -> None:
+        self._started = False
+        self._final = status if self._keep else None
+
+
+def sequence(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children succeed. Every tick starts at the first child."""
+    return Sequence(name, memory=False, children=list(children))
+
+
+def fallback(name: str, *children: Behaviour) -> Behaviour:
+    """Goes on while children fail. Every tick starts at the first child."""
+    return Selector(name, memory=False, children=list(children))
+
+
+@runtime_checkable
+class WithSetup(Protocol):
+    """A robot that prepares itself before the first tick."""
+
+    def setup(self, **kwargs: Any) -> None:
+        """Called once, with what the owner of the tree hands on: in py_trees_ros, ``node``."""
+
+
+@runtime_checkable
+class WithBeliefs(Protocol):
+    """A robot that can tell what it has not heard of yet."""
+
+    def heard_of(self, *fact: str, unknown: bool) -> bool:
+        """Whether a fact is known to be true or false, or, where ``unknown`` will do, unknown."""
+
+
+class StopWhenBlocked(Decorator):
+    """The root. It knows the action that runs, and holds what that may itself set, so that no
+    action ends by what it does. A tick that passes it by cancels it and is RUNNING; all is read
+    anew in the next one.
+
+    FAILURE where the tree is RUNNING but no action is. Something is unknown then that
+    nothing can observe, and nothing would ever change. Before its first tick the tree waits,
+    however long, until the robot has heard of every fact in ``reads``, which tells for each whether
+    it can be unknown."""
+
+    def __init__(
+        self,
+        robot: object,
+        child: Behaviour,
+        reads: Mapping[Fact, bool] | None = None,
+    ) -> None:
+        super().__init__(name="stop when blocked", child=child)
+        self._view = robot if isinstance(robot, View) else View(robot)
+        self._robot: object = self._view.robot
+        self._reads = dict(reads or {})
+        self._said: float | None = None
+        self._acting = False
+        self._last: Latch | None = None
+        self.committed = False
+        """Was an action running when the tick began?"""
+
+    def setup(self, **kwargs: Any) -> None:
+        if isinstance(self._robot, WithSetup):
+            self._robot.setup(**kwargs)
+
+    def shutdown(self) -> None:
+        # py_trees ends a tree with this alone, even where an action runs that nobody cancels.
+        if self.status == Status.RUNNING:
+            self.stop(Status.INVALID)
+
+    def acts(self, latch: Latch, own: Iterable[Fact]) -> None:
+        """A latch below is about to run its action in this tick, after it notes its ``own``."""
+        for fact in own:
+            ask: Any = self._robot
+            for name in fact[0].split("."):
+                ask = getattr(ask, name)
+            self._view.held[fact] = ask(*fact[1:])
+        self._last = latch
+        self._acting = True
+
+    def tick(self) -> Iterator[Behaviour]:
+        if self._reads and self._waits():
+            self.status = Status.RUNNING
+            yield self
+            return
+        self._reads.clear()
+        self._acting = False
+        self.committed = self._last is not None and self._last.running
+        if not self.committed:
+            self._view.held.clear()
+        yield from super().tick()
+
+    def _waits(self) -> bool:
+        if not isinstance(self._robot, WithBeliefs):
+            return False
+        heard, facts = self._robot.heard_of, self._reads.items()
+        missing = [in_words(fact) for fact, unknown in facts if not heard(*fact, unknown=unknown)]
+        self.feedback_message = f"waiting to hear of {', '.join(missing)}" if missing else ""
+        now = time.monotonic()
+        if missing and (self._said is None or now - self._said >= 10.0):
+            self._said = now
+            self.logger.warning(self.feedback_message)
+        return bool(missing)
+
+    def update(self) -> Status:
+        if self.committed and not self._acting:
+            if self._last is not None and self._last.running:
+                self._last.stop(Status.INVALID)
+            self.feedback_message = "" if self._last is None else f"{self._last.name}: cancelled"
+            return Status.RUNNING
+        if self.decorated.status == Status.RUNNING and not self._acting:
+            self.feedback_message = "blocked: nothing can observe what is unknown" + self._refused()
+            return Status.FAILURE
+        if self.decorated.status == Status.FAILURE and self._last is None:
+            self.feedback_message = "no action was started" + self._refused()
+        return self.decorated.status
+
+    def _refused(self) -> str:
+        """The actions that were not started, and why."""
+        latches = [node for node in self.decorated.iterate() if isinstance(node, Latch)]
+        refused = [node for node in latches if node.feedback_message]
+        return "".join(f"; {node.name}: {node.feedback_message}" for node in refused)
+
+
+def run(root: Behaviour, period: float = 0.0) -> Status:
+    """Set a tree up and tick it until it ends, with a pause of ``period`` seconds between ticks.
+    An exception, such as that of Ctrl-C, cancels the action that runs."""
+    tree = BehaviourTree(root)
+    tree.setup()
+    try:
+        while True:
+            tree.tick()
+            if root.status != Status.RUNNING:
+                return root.status
+            time.sleep(period)
+    finally:
+        if root.status == Status.RUNNING:
+            root.stop(Status.INVALID)
+
+
+class Within:
+    """An action that is given up after so many seconds: it is cancelled then, and has ended."""
+
+    def __init__(
+        self, seconds: float, name: str, act: Callable[[], Status], cancel: Callable[[str], None]
+    ) -> None:
+        self._seconds = seconds
+        self._name = name
+        self._act = act
+        self._cancel = cancel
+        self._since: float | None = None
+
+    def act(self) -> Status:
+        now = time.monotonic()
+        if self._since is None:
+            self._since = now
+        if now - self._since > self._seconds:
+            self.cancel(self._name)
+            return Status.SUCCESS
+        status = self._act()
+        if status != Status.RUNNING:
+            self._since = None
+        return status
+
+    def cancel(self, name: str) -> None:
+        self._since = None
+        self._cancel(name)
+
+
+def within(
+    seconds: float, name: str, act: Callable[[], Status], cancel: Callable[[str], None]
+) -> tuple[str, Callable[[], Status], Callable[[str], None]]:
+    """The first three arguments of a Latch whose action is given up after so many seconds."""
+    limited = Within(seconds, name, act, cancel)
+    return name, limited.act, limited.cancel
+
+
+def create_root(robot: Robot) -> Behaviour:
+    """The tree. Latches stay latched, so it runs once: make a new one for another run."""
+    robot = view(robot)
+    return StopWhenBlocked(
+        robot,
+        fallback(
+            "fallback",
+            Condition(
+                "(delivered() and at(charger))",
+                lambda: all_of(robot.delivered(), robot.at("charger")),
+            ),
+            Latch(
+                "push(swing-door,corridor,charger)",
+                lambda: robot.push("swing-door", "corridor", "charger"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("corridor"), negated(robot.open("swing-door"))),
+                keep=False,
+                own=OWN["push(swing-door,corridor,charger)"],
+            ),
+            Latch(
+                *within(15.0, "hand-over(office)", lambda: robot.hand_over("office"), robot.cancel),
+                guard=lambda: all_of(robot.at("office"), robot.loaded()),
+                keep=False,
+                own=OWN["hand-over(office)"],
+            ),
+            Latch(
+                "load(charger)",
+                lambda: robot.load("charger"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("charger"),
+                    negated(robot.loaded()),
+                    negated(robot.delivered()),
+                ),
+                keep=False,
+                own=OWN["load(charger)"],
+            ),
+            sequence(
+                "for at(charger)",
+                Condition("not loaded()", lambda: negated(robot.loaded())),
+                Latch(
+                    "pass(swing-door,corridor,charger)",
+                    lambda: robot.do_pass("swing-door", "corridor", "charger"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.at("corridor"),
+                        between(robot.battery(), 1, None),
+                        robot.open("swing-door"),
+                    ),
+                    keep=False,
+                    own=OWN["pass(swing-door,corridor,charger)"],
+                ),
+            ),
+            sequence(
+                "for at(office)",
+                Condition("battery() >= 3", lambda: between(robot.battery(), 3, None)),
+                Latch(
+                    "drive(corridor,office)",
+                    lambda: robot.drive("corridor", "office"),
+                    robot.cancel,
+                    guard=lambda: all_of(
+                        robot.at("corridor"),
+                        between(robot.battery(), 1, None),
+                        negated(robot.crowded("office")),
+                    ),
+                    keep=False,
+                    own=OWN["drive(corridor,office)"],
+                ),
+            ),
+            sequence(
+                "sequence",
+                Condition("battery() <= 3", lambda: between(robot.battery(), None, 3)),
+                Latch(
+                    "charge(charger)",
+                    lambda: robot.charge("charger"),
+                    robot.cancel,
+                    guard=lambda: all_of(robot.at("charger"), between(robot.battery(), None, 9)),
+                    keep=False,
+                    own=OWN["charge(charger)"],
+                ),
+            ),
+            Latch(
+                "drive(office,corridor)",
+                lambda: robot.drive("office", "corridor"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("office"),
+                    between(robot.battery(), 1, None),
+                    negated(robot.crowded("corridor")),
+                ),
+                keep=False,
+                own=OWN["drive(office,corridor)"],
+            ),
+            sequence(
+                "sequence",
+                Condition("at(office)", lambda: robot.at("office")),
+                Latch("wait()", robot.wait, robot.cancel, keep=False),
+            ),
+            Latch(
+                "pass(swing-door,charger,corridor)",
+                lambda: robot.do_pass("swing-door", "charger", "corridor"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("charger"),
+                    between(robot.battery(), 1, None),
+                    robot.open("swing-door"),
+                ),
+                keep=False,
+                own=OWN["pass(swing-door,charger,corridor)"],
+            ),
+            Latch(
+                "charge(charger)",
+                lambda: robot.charge("charger"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("charger"), between(robot.battery(), None, 9)),
+                keep=False,
+                own=OWN["charge(charger)"],
+            ),
+            Latch(
+                "push(swing-door,charger,corridor)",
+                lambda: robot.push("swing-door", "charger", "corridor"),
+                robot.cancel,
+                guard=lambda: all_of(robot.at("charger"), negated(robot.open("swing-door"))),
+                keep=False,
+                own=OWN["push(swing-door,charger,corridor)"],
+            ),
+            Latch(
+                "pass(swing-door,corridor,charger)",
+                lambda: robot.do_pass("swing-door", "corridor", "charger"),
+                robot.cancel,
+                guard=lambda: all_of(
+                    robot.at("corridor"),
+                    between(robot.battery(), 1, None),
+                    robot.open("swing-door"),
+                ),
+                keep=False,
+                own=OWN["pass(swing-door,corridor,charger)"],
+            ),
+            Latch("wait()", robot.wait, robot.cancel, keep=False),
+        ),
+        READS,
+    )
+
+
+State = dict[Fact, bool | None]
+T = TypeVar("T")
+
+
+class When:
+    """Changes that happen if a condition is True in the state before the action."""
+
+    def __init__(self, condition: Callable[[State], bool | None], changes: State) -> None:
+        self.condition = condition
+        self.changes = changes
+
+
+class Outcome:
+    """One thing that may happen, with its probability: changes, and independent choices that
+    follow."""
+
+    def __init__(
+        self, probability: str, changes: State, *conditional: When, then: list[Factor] | None = None
+    ) -> None:
+        self.probability = probability
+        self.changes = changes
+        self.conditional = conditional
+        self.then = then or []
+
+
+Factor = list[Outcome]
+
+
+def draw(rng: random.Random, choices: list[tuple[str, T]]) -> T:
+    """One of the values, with exactly the given probabilities."""
+    weights = [Fraction(probability) for probability, _ in choices]
+    whole = math.lcm(*(weight.denominator for weight in weights))
+    point = rng.randrange(whole)
+    for weight, (_, value) in zip(weights, choices, strict=True):
+        point -= int(weight * whole)
+        if point < 0:
+            return value
+    return choices[-1][1]
+
+
+def happen(rng: random.Random, factors: list[Factor], before: State) -> State:
+    """What an action changes: one outcome of every factor. All conditions are read before any
+    change; where changes clash, True wins over None (unknown), and None over False."""
+    changes: State = {}
+    strength = {False: 0, None: 1, True: 2}
+    for factor in factors:
+        outcome = draw(rng, [(outcome.probability, outcome) for outcome in factor])
+        drawn = [part.changes for part in outcome.conditional if part.condition(before)]
+        for part in [outcome.changes, *drawn, happen(rng, outcome.then, before)]:
+            for fact, value in part.items():
+                if fact not in changes or strength[value] > strength[changes[fact]]:
+                    changes[fact] = value
+    return changes
+
+
+class World:
+    """A world that behaves as the domain says, by chance. The outcome of an action applies at
+    once; the tree looks at it in the next tick."""
+
+    def __init__(
+        self,
+        initial: list[tuple[str, State]],
+        actions: dict[Fact, list[Factor]],
+        rng: random.Random,
+        report: Callable[[str], None],
+    ) -> None:
+        start: State = draw(rng, initial)
+        self._state = dict(start)
+        self._actions = actions
+        self._rng = rng
+        self._report = report
+
+    def cancel(self, action: str) -> None:
+        """Nothing to do: no action here runs for longer than a tick."""
+
+    def _value(self, *fact: str) -> bool | None:
+        return self._state[fact]
+
+    def _act(self, *action: str) -> Status:
+        changes = happen(self._rng, self._actions[action], self._state)
+        self._state.update(changes)
+        words = {True: "true", False: "false", None: "unknown"}
+        told = ", ".join(f"{in_words(fact)} {words[value]}" for fact, value in changes.items())
+        self._report(f"{in_words(action)}: {told or 'no change'}")
+        return Status.SUCCESS
+
+
+def simulate(make: Callable[[random.Random, Callable[[str], None]], Behaviour]) -> None:
+    """Run trees in the simulated world as the command line says; ``make`` makes one."""
+    parser = argparse.ArgumentParser(description="Run the tree in a simulated world.")
+    parser.add_argument("--seed", type=int, default=0, help="of the random numbers (default: 0)")
+    parser.add_argument("--runs", type=int, default=1, help="with more than one, count successes")
+    options = parser.parse_args()
+    rng = random.Random(options.seed)
+    if options.runs == 1:
+        status = run(make(rng, print))
+        print(f"The tree returned {status.value}.")
+    else:
+        ends = [run(make(rng, lambda _: None)) for _ in range(options.runs)]
+        print(f"{ends.count(Status.SUCCESS)} of {options.runs} runs succeeded.")
+
+
+Test = Callable[[State], bool | None]
+Rounds = list[list[tuple[Test, list[Factor]]]]
+
+
+class MovingWorld(World):
+    """A world with events. ``events`` are, for each action, those of each round: where one may happen, and
+    what it does. Of the actions that events may end: while what they go on, and what happens else."""
+
+    def __init__(
+        self,
+        initial: list[tuple[str, State]],
+        actions: dict[Fact, list[Factor]],
+        rng: random.Random,
+        report: Callable[[str], None],
+        *,
+        events: dict[Fact, Rounds],
+        interrupted: dict[Fact, tuple[Test, list[Factor]]],
+    ) -> None:
+        super().__init__(initial, actions, rng, report)
+        self._events = events
+        self._interrupted = interrupted
+
+    def _act(self, *action: str) -> Status:
+        if action not in self._interrupted:
+            status = super()._act(*action)
+            self._happen(*action)
+            return status
+        self._happen(*action)
+        goes_on, abort = self._interrupted[action]
+        if goes_on(self._state) is True:
+            return super()._act(*action)
+        self._state.update(happen(self._rng, abort, self._state))
+        self._report(f"{in_words(action)}: aborted")
+        return Status.SUCCESS
+
+    def _happen(self, *action: str) -> None:
+        """The events of one draw: those of a round all read the state that it begins with."""
+        for events in self._events[action]:
+            due = [factors for test, factors in events if test(self._state) is True]
+            changes = happen(self._rng, [factor for factors in due for factor in factors], self._state)
+            words = {True: "true", False: "false", None: "unknown"}
+            told = [
+                f"{in_words(fact)} {words[value]}"
+                for fact, value in changes.items()
+                if value != self._state[fact]
+            ]
+            self._state.update(changes)
+            if told:
+                self._report(f"by itself: {', '.join(told)}")
+
+
+Values = dict[Fact, Any]
+
+
+def between(value: int | None, low: int | None, high: int | None) -> bool | None:
+    """Whether a number is no less than one and no more than another; None where it is unknown."""
+    if value is None:
+        return None
+    return (low is None or low <= value) and (high is None or value <= high)
+
+
+class Shift(When):
+    """Adds to a number, no further than to the bounds of its range, if a condition is True in the
+    state before the action."""
+
+    def __init__(
+        self,
+        fact: Fact,
+        amount: int,
+        low: int,
+        high: int,
+        condition: Callable[[State], bool | None] = lambda _: True,
+    ) -> None:
+        super().__init__(condition, {})
+        self.fact = fact
+        self.amount = amount
+        self.low = low
+        self.high = high
+
+    def on(self, before: Values) -> When:
+        """What it comes to in a state."""
+        value = min(max(before[self.fact] + self.amount, self.low), self.high)
+        changes: Values = {self.fact: value}
+        return When(self.condition, changes)
+
+
+def on_numbers(factors: list[Factor], before: Values) -> list[Factor]:
+    """Factors in which numbers get the values that they come to in a state."""
+    return [
+        [
+            Outcome(
+                outcome.probability,
+                outcome.changes,
+                *(part.on(before) if isinstance(part, Shift) else part for part in outcome.conditional),
+                then=on_numbers(outcome.then, before),
+            )
+            for outcome in factor
+        ]
+        for factor in factors
+    ]
+
+
+def number_changes(rng: random.Random, factors: list[Factor], before: State) -> Values:
+    """What an action or an event changes, numbers included."""
+    changes: Values = happen(rng, on_numbers(factors, before), before)
+    return changes
+
+
+def said(value: Any) -> str:
+    """A value in words."""
+    if value is None:
+        return "unknown"
+    return str(value).lower()
+
+
+def in_short(changes: Values, before: State) -> str:
+    """What differs from the state before, in words."""
+    kept: Values = before
+    return ", ".join(
+        f"{in_words(fact)} {said(value)}" for fact, value in changes.items() if value != kept[fact]
+    )
+
+
+class MovingNumberWorld(MovingWorld):
+    """A world with numbers among its facts, and with events."""
+
+    def _number(self, *fact: str) -> int:
+        state: Values = self._state
+        value: int = state[fact]
+        return value
+
+    def _act(self, *action: str) -> Status:
+        if action not in self._interrupted:
+            self._change(action, self._actions[action], "no change")
+            self._happen(*action)
+            return Status.SUCCESS
+        self._happen(*action)
+        goes_on, abort = self._interrupted[action]
+        if goes_on(self._state) is True:
+            self._change(action, self._actions[action], "no change")
+        else:
+            self._change(action, abort, "aborted")
+        return Status.SUCCESS
+
+    def _change(self, action: Fact, factors: list[Factor], otherwise: str) -> None:
+        changes = number_changes(self._rng, factors, self._state)
+        told = in_short(changes, self._state)
+        self._state.update(changes)
+        self._report(f"{in_words(action)}: {told or otherwise}")
+
+    def _happen(self, *action: str) -> None:
+        for events in self._events[action]:
+            due = [factors for test, factors in events if test(self._state) is True]
+            factors = [factor for each in due for factor in each]
+            changes = number_changes(self._rng, factors, self._state)
+            told = in_short(changes, self._state)
+            self._state.update(changes)
+            if told:
+                self._report(f"by itself: {told}")
+
+
+READS: dict[Fact, bool] = {
+    ("at", "charger"): False,
+    ("at", "corridor"): False,
+    ("at", "office"): False,
+    ("battery",): False,
+    ("crowded", "corridor"): False,
+    ("crowded", "office"): False,
+    ("delivered",): False,
+    ("loaded",): False,
+    ("open", "swing-door"): False,
+}
+"""The facts that the tree reads, and whether they can be unknown."""
+
+
+OWN: dict[str, list[Fact]] = {
+    "charge(charger)": [("battery",)],
+    "drive(corridor,office)": [("at", "corridor"), ("at", "office"), ("battery",)],
+    "drive(office,corridor)": [("at", "corridor"), ("at", "office"), ("battery",)],
+    "hand-over(office)": [("delivered",), ("loaded",)],
+    "load(charger)": [("loaded",)],
+    "pass(swing-door,charger,corridor)": [("at", "charger"), ("at", "corridor"), ("battery",)],
+    "pass(swing-door,corridor,charger)": [("at", "charger"), ("at", "corridor"), ("battery",)],
+    "push(swing-door,charger,corridor)": [("open", "swing-door")],
+    "push(swing-door,corridor,charger)": [("open", "swing-door")],
+}
+"""What the tree reads and an action may itself set: held while it runs."""
+
+
+INITIAL: list[tuple[str, Values]] = [
+    (
+        "1",
+        {
+            ("at", "charger"): True,
+            ("at", "corridor"): False,
+            ("at", "office"): False,
+            ("crowded", "corridor"): False,
+            ("crowded", "office"): False,
+            ("delivered",): False,
+            ("loaded",): False,
+            ("open", "swing-door"): False,
+            ("battery",): 5,
+        },
+    ),
+]
+"""The states a run may start in, with their probabilities."""
+
+
+ACTIONS: dict[Fact, list[Factor]] = {
+    ("charge", "charger"): [[Outcome("1", {}, Shift(("battery",), 4, 0, 10))]],
+    ("drive", "corridor", "office"): [
+        [
+            Outcome(
+                "1",
+                {("at", "corridor"): False, ("at", "office"): True},
+                Shift(("battery",), -1, 0, 10),
+            ),
+        ],
+    ],
+    ("drive", "office", "corridor"): [
+        [
+            Outcome(
+                "1",
+                {("at", "corridor"): True, ("at", "office"): False},
+                Shift(("battery",), -1, 0, 10),
+            ),
+        ],
+    ],
+    ("hand-over", "office"): [
+        [Outcome("1/3", {}), Outcome("2/3", {("delivered",): True, ("loaded",): False})],
+    ],
+    ("load", "charger"): [[Outcome("1", {("loaded",): True})]],
+    ("pass", "swing-door", "charger", "corridor"): [
+        [
+            Outcome(
+                "1",
+                {("at", "charger"): False, ("at", "corridor"): True},
+                Shift(("battery",), -1, 0, 10),
+            ),
+        ],
+    ],
+    ("pass", "swing-door", "corridor", "charger"): [
+        [
+            Outcome(
+                "1",
+                {("at", "charger"): True, ("at", "corridor"): False},
+                Shift(("battery",), -1, 0, 10),
+            ),
+        ],
+    ],
+    ("push", "swing-door", "charger", "corridor"): [
+        [Outcome("7/10", {("open", "swing-door"): True}), Outcome("3/10", {})],
+    ],
+    ("push", "swing-door", "corridor", "charger"): [
+        [Outcome("7/10", {("open", "swing-door"): True}), Outcome("3/10", {})],
+    ],
+    ("wait",): [[Outcome("1", {})]],
+}
+"""What each action does: independent choices between outcomes."""
+
+
+MOVES: Rounds = [
+    [
+        (
+            lambda s: s[("open", "swing-door")],
+            [
+                [
+                    Outcome("953930201013/1000000000000", {("open", "swing-door"): False}),
+                    Outcome("46069798987/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("crowded", "corridor")]),
+            [
+                [
+                    Outcome("635207689247/1000000000000", {("crowded", "corridor"): True}),
+                    Outcome("364792310753/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: s[("crowded", "corridor")],
+            [
+                [
+                    Outcome("123008792083/125000000000", {("crowded", "corridor"): False}),
+                    Outcome("1991207917/125000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("open", "swing-door")]),
+            [
+                [
+                    Outcome("24408883857/31250000000", {("open", "swing-door"): True}),
+                    Outcome("6841116143/31250000000", {}),
+                ],
+            ],
+        ),
+    ],
+]
+
+
+MOVES_2: Rounds = [
+    [
+        (
+            lambda s: s[("open", "swing-door")],
+            [
+                [
+                    Outcome("387994581781/1000000000000", {("open", "swing-door"): False}),
+                    Outcome("612005418219/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("crowded", "corridor")]),
+            [
+                [
+                    Outcome("37378151941/250000000000", {("crowded", "corridor"): True}),
+                    Outcome("212621848059/250000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: s[("crowded", "corridor")],
+            [
+                [
+                    Outcome("241123694533/500000000000", {("crowded", "corridor"): False}),
+                    Outcome("258876305467/500000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("open", "swing-door")]),
+            [
+                [
+                    Outcome("108081742663/500000000000", {("open", "swing-door"): True}),
+                    Outcome("391918257337/500000000000", {}),
+                ],
+            ],
+        ),
+    ],
+]
+
+
+MOVES_3: Rounds = [
+    [
+        (
+            lambda s: s[("open", "swing-door")],
+            [
+                [
+                    Outcome("17680857781/40000000000", {("open", "swing-door"): False}),
+                    Outcome("22319142219/40000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("crowded", "corridor")]),
+            [
+                [
+                    Outcome("176753468443/1000000000000", {("crowded", "corridor"): True}),
+                    Outcome("823246531557/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: s[("crowded", "corridor")],
+            [
+                [
+                    Outcome("67562330007/125000000000", {("crowded", "corridor"): False}),
+                    Outcome("57437669993/125000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("open", "swing-door")]),
+            [
+                [
+                    Outcome("126528318403/500000000000", {("open", "swing-door"): True}),
+                    Outcome("373471681597/500000000000", {}),
+                ],
+            ],
+        ),
+    ],
+]
+
+
+MOVES_4: Rounds = [
+    [
+        (
+            lambda s: s[("open", "swing-door")],
+            [
+                [
+                    Outcome("723901/3200000", {("open", "swing-door"): False}),
+                    Outcome("2476099/3200000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("crowded", "corridor")]),
+            [
+                [
+                    Outcome("16120293467/200000000000", {("crowded", "corridor"): True}),
+                    Outcome("183879706533/200000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: s[("crowded", "corridor")],
+            [
+                [
+                    Outcome("72938600823/250000000000", {("crowded", "corridor"): False}),
+                    Outcome("177061399177/250000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("open", "swing-door")]),
+            [
+                [
+                    Outcome("118904306641/1000000000000", {("open", "swing-door"): True}),
+                    Outcome("881095693359/1000000000000", {}),
+                ],
+            ],
+        ),
+    ],
+]
+
+
+MOVES_5: Rounds = [
+    [
+        (
+            lambda s: s[("open", "swing-door")],
+            [
+                [
+                    Outcome("29679/160000", {("open", "swing-door"): False}),
+                    Outcome("130321/160000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("crowded", "corridor")]),
+            [
+                [
+                    Outcome("32509220679/500000000000", {("crowded", "corridor"): True}),
+                    Outcome("467490779321/500000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: s[("crowded", "corridor")],
+            [
+                [
+                    Outcome("241165432099/1000000000000", {("crowded", "corridor"): False}),
+                    Outcome("758834567901/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("open", "swing-door")]),
+            [
+                [
+                    Outcome("246559/2560000", {("open", "swing-door"): True}),
+                    Outcome("2313441/2560000", {}),
+                ],
+            ],
+        ),
+    ],
+]
+
+
+MOVES_6: Rounds = [
+    [
+        (
+            lambda s: s[("open", "swing-door")],
+            [
+                [
+                    Outcome("205334012077/1000000000000", {("open", "swing-door"): False}),
+                    Outcome("794665987923/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("crowded", "corridor")]),
+            [
+                [
+                    Outcome("72744475749/1000000000000", {("crowded", "corridor"): True}),
+                    Outcome("927255524251/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: s[("crowded", "corridor")],
+            [
+                [
+                    Outcome("265586863459/1000000000000", {("crowded", "corridor"): False}),
+                    Outcome("734413136541/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("open", "swing-door")]),
+            [
+                [
+                    Outcome("53732600543/500000000000", {("open", "swing-door"): True}),
+                    Outcome("446267399457/500000000000", {}),
+                ],
+            ],
+        ),
+    ],
+]
+
+
+MOVES_7: Rounds = [
+    [
+        (
+            lambda s: s[("open", "swing-door")],
+            [[Outcome("1141/8000", {("open", "swing-door"): False}), Outcome("6859/8000", {})]],
+        ),
+        (
+            lambda s: negated(s[("crowded", "corridor")]),
+            [
+                [
+                    Outcome("6146412037/125000000000", {("crowded", "corridor"): True}),
+                    Outcome("118853587963/125000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: s[("crowded", "corridor")],
+            [
+                [
+                    Outcome("186962962963/1000000000000", {("crowded", "corridor"): False}),
+                    Outcome("813037037037/1000000000000", {}),
+                ],
+            ],
+        ),
+        (
+            lambda s: negated(s[("open", "swing-door")]),
+            [[Outcome("4681/64000", {("open", "swing-door"): True}), Outcome("59319/64000", {})]],
+        ),
+    ],
+]
+
+
+EVENTS: dict[Fact, Rounds] = {
+    ("charge", "charger"): MOVES,
+    ("drive", "corridor", "office"): MOVES_2,
+    ("drive", "office", "corridor"): MOVES_2,
+    ("hand-over", "office"): MOVES_3,
+    ("load", "charger"): MOVES_4,
+    ("pass", "swing-door", "charger", "corridor"): MOVES_5,
+    ("pass", "swing-door", "corridor", "charger"): MOVES_5,
+    ("push", "swing-door", "charger", "corridor"): MOVES_6,
+    ("push", "swing-door", "corridor", "charger"): MOVES_6,
+    ("wait",): MOVES_7,
+}
+"""What happens by itself with each action, round by round: where it may, and what."""
+
+
+INTERRUPTED: dict[Fact, tuple[Test, list[Factor]]] = {
+    ("drive", "corridor", "office"): (lambda s: negated(s[("crowded", "office")]), []),
+    ("drive", "office", "corridor"): (lambda s: negated(s[("crowded", "corridor")]), []),
+    ("pass", "swing-door", "charger", "corridor"): (lambda s: s[("open", "swing-door")], []),
+    ("pass", "swing-door", "corridor", "charger"): (lambda s: s[("open", "swing-door")], []),
+}
+"""While what actions go on that events may end, and what happens else."""
+
+
+class SimulatedWorld(MovingNumberWorld):
+    """Plays the robot."""
+
+    def battery(self) -> int | None:
+        return self._number("battery")
+
+    def at(self, place: str) -> bool | None:
+        return self._value("at", place)
+
+    def crowded(self, place: str) -> bool | None:
+        return self._value("crowded", place)
+
+    def delivered(self) -> bool | None:
+        return self._value("delivered")
+
+    def loaded(self) -> bool | None:
+        return self._value("loaded")
+
+    def open(self, door: str) -> bool | None:
+        return self._value("open", door)
+
+    def charge(self, place: str) -> Status:
+        return self._act("charge", place)
+
+    def drive(self, arg_from: str, to: str) -> Status:
+        return self._act("drive", arg_from, to)
+
+    def hand_over(self, place: str) -> Status:
+        return self._act("hand-over", place)
+
+    def load(self, place: str) -> Status:
+        return self._act("load", place)
+
+    def do_pass(self, door: str, arg_from: str, to: str) -> Status:
+        return self._act("pass", door, arg_from, to)
+
+    def push(self, door: str, arg_from: str, to: str) -> Status:
+        return self._act("push", door, arg_from, to)
+
+    def wait(self) -> Status:
+        return self._act("wait")
+
+
+def main() -> None:
+    """Run the tree in the simulated world."""
+
+    def make(rng: random.Random, report: Callable[[str], None]) -> Behaviour:
+        world = SimulatedWorld(
+            INITIAL, ACTIONS, rng, report, events=EVENTS, interrupted=INTERRUPTED
+        )
+        return create_root(world)
+
+    simulate(make)
+
+
+if __name__ == "__main__":
+    main()
