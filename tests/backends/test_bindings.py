@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ import yaml
 from jsonschema import Draft202012Validator
 
 import bbtc
+from bbtc.artefacts import dumps, tree_to_json
 from bbtc.backends.btcpp.bindings.fits import misfit
 from bbtc.backends.btcpp.bindings.read import files_of, read_bindings
 from bbtc.backends.btcpp.exporter import btcpp
@@ -278,6 +280,45 @@ def same_runs(folder: Path, tree: Tree, seed: int) -> int:
 def test_a_bound_tree_does_what_the_tree_of_our_leaves_does(problem: Problem, tmp_path: Path) -> None:
     pytest.importorskip("behaviortreepy")
     assert same_runs(tmp_path, tree_of(problem), 1) or problem.name == "look-in-fridge"  # which hardly acts
+
+
+@pytest.mark.parametrize("problem", [p for p in PROBLEMS if p.domain in BOUND], ids=str)
+def test_a_file_with_nodes_of_others_is_read_back_as_the_very_same_tree(
+    problem: Problem, tmp_path: Path
+) -> None:
+    """By the same bindings, with the notes at its end and without."""
+    tree = tree_of(problem)
+    (tmp_path / "bindings.yaml").write_text(all_bound(tree), encoding="utf-8")
+    options = {"bindings": str(tmp_path / "bindings.yaml")}
+    saved = tmp_path / "tree.json"
+    saved.write_text(dumps(tree_to_json(tree)))
+    text = btcpp.export(tree, options, None)
+    (tmp_path / "tree.xml").write_text(text)
+    back = bbtc.import_tree(tmp_path / "tree.xml", saved, bindings=options["bindings"])
+    assert dumps(tree_to_json(back)) == saved.read_text()
+    (tmp_path / "tree.xml").write_text(re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL))
+    edited = bbtc.import_tree(tmp_path / "tree.xml", saved, bindings=options["bindings"])
+    assert edited.success_probability == tree.success_probability
+    with pytest.raises(BbtcError):  # the nodes are no leaves of the task
+        bbtc.import_tree(tmp_path / "tree.xml", saved)
+
+
+def test_a_node_that_stands_for_nothing_or_for_several_is_told(tmp_path: Path) -> None:
+    tree = patrol()
+    (tmp_path / "patrol.pddl").write_text(PATROL)
+    text = ET.tostring(bound(tmp_path, tree), encoding="unicode")
+    task, bindings = tmp_path / "patrol.pddl", tmp_path / "bindings.yaml"
+
+    def told(xml: str) -> str:
+        (tmp_path / "edited.xml").write_text(xml)
+        with pytest.raises(BbtcError) as raised:
+            bbtc.import_tree(tmp_path / "edited.xml", task, bindings=bindings)
+        return raised.value.diagnostics[0].message
+
+    assert told(text.replace("map;4.0", "map;5.0")).endswith("stands for nothing of the task")
+    assert told(text.replace('min_battery="0.2"', 'min_battery="0.3"')).endswith("for nothing of the task")
+    bindings.write_text(BINDINGS.replace(POSES["hall"], POSES["kitchen"]))
+    assert "may be each of" in told(text)
 
 
 def test_random_bound_trees_do_what_those_of_our_leaves_do(tmp_path: Path) -> None:

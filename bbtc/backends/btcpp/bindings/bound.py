@@ -149,7 +149,7 @@ def bound_leaves(tree: Tree, interface: Interface, bindings: Bindings) -> dict[S
         binding = None if leaf.counts else bindings.find(_kind(leaf), leaf.symbol.name)
         if binding is None:
             continue
-        bound = BoundLeaf(leaf, binding, _parameter_names(tree.task, leaf))
+        bound = BoundLeaf(leaf, binding, parameter_names(tree.task, leaf.symbol, leaf.parameters))
         wrong = list(_argument_faults(bound, uses.get(leaf.symbol, {})))
         if wrong:
             faults += [fault for fault in wrong if fault not in faults]
@@ -234,13 +234,12 @@ def _unknown_parameters(binding: Binding, signatures: list[Signature]) -> Iterat
             yield Diagnostic("BBT0708", message, span, hint=hint)
 
 
-def _parameter_names(task: Task, leaf: Leaf) -> tuple[str, ...]:
-    """The parameters of a leaf as the domain has them; where that is not known, those of our leaves."""
-    symbol = leaf.symbol
+def parameter_names(task: Task, symbol: Symbol, own: tuple[str, ...]) -> tuple[str, ...]:
+    """The parameters of a leaf as the domain has them; where that is not known, its ``own``."""
     for each in task.signatures:
         if (each.kind, each.symbol, len(each.parameters)) == (symbol.kind, symbol.name, symbol.arity):
             return each.parameters
-    return leaf.parameters
+    return own
 
 
 def _argument_faults(bound: BoundLeaf, uses: Mapping[tuple[str, ...], None]) -> Iterator[Diagnostic]:

@@ -14,6 +14,7 @@ from fractions import Fraction
 from itertools import islice
 
 from bbtc.artefacts.cursor import clip
+from bbtc.backends.btcpp.bindings.entries import Bindings
 from bbtc.backends.btcpp.idioms import (
     HELD,
     LATCH,
@@ -50,6 +51,7 @@ from bbtc.backends.btcpp.reader.patterns import (
     match_one,
     tag_of,
 )
+from bbtc.backends.btcpp.reader.unbound import put_back
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlElement, parse_xml
 from bbtc.backends.interface import guard_of
@@ -113,10 +115,12 @@ def tree_from_btcpp(
     *,
     namespace: str = "",
     main: str | None = None,
+    bindings: Bindings | None = None,
 ) -> Imported:
     """The tree of a BehaviorTree.CPP file, on a task. Its success probability is what the file's notes
     claim, or 0 without a meaning where they claim nothing. ``namespace`` is that of the ids, where the notes
-    do not tell; ``main`` the id of the tree to read, where it is not the one that the file runs.
+    do not tell; ``main`` the id of the tree to read, where it is not the one that the file runs; ``bindings``
+    are those that it was exported with.
 
     Raises :class:`BbtcError` with everything that cannot be read, and :class:`LimitReached` for a tree of
     more nodes than the limits allow. Doubts go to the report.
@@ -132,6 +136,8 @@ def tree_from_btcpp(
         about = clip(f"{notes.domain}/{notes.problem}")
         message = f"the tree is for {about}, the task is {clip(f'{task.domain}/{task.problem}')}"
         raise BbtcError.single("BBT0604", message, document.span(document.root))
+    if bindings is not None:
+        put_back(document, task, notes.names, bindings)
     layout = Layout(document, main)
     reader = _Reader(layout, task, notes, limits)
     root = unwind(reader.main())
