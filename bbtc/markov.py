@@ -11,9 +11,10 @@ Gaussian elimination over rationals, the state with the fewest links first (mini
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
-from math import gcd, prod
+from math import gcd, lcm, prod
 from typing import TypeAlias, TypeVar
 
 Row: TypeAlias = dict[int, Fraction]
@@ -50,7 +51,7 @@ def independent(parts: Iterable[Mapping[_N, Fraction]]) -> Iterator[tuple[tuple[
         yield tuple(outcome for outcome, _ in drawn), prod((p for _, p in drawn), start=_ONE)
 
 
-def weighted(pairs: Iterable[tuple[Fraction, Fraction]], more: Fraction = _ZERO) -> Fraction:
+def weighted(pairs: Iterable[tuple[Fraction | int, Fraction]], more: Fraction | int = _ZERO) -> Fraction:
     """The sum of the products of pairs, and what is ``more``: what ``+`` and ``*`` give, but reduced at the
     end, and not at each step."""
     numerator, denominator = more.as_integer_ratio()
@@ -154,6 +155,44 @@ def solve(
     return values
 
 
+@dataclass(slots=True)
+class _Equation:
+    """``scale`` times a state's value is the sum of ``factors`` times those of others, and a ``constant``.
+    All are whole numbers without a common divisor: they are reduced once a step, and not at each sum."""
+
+    factors: dict[int, int]
+    constant: int
+    scale: int
+
+    @classmethod
+    def of(cls, row: Row, constant: Fraction) -> _Equation:
+        """That a value is the sum of fractions of others, and a constant."""
+        scale = lcm(constant.denominator, *(p.denominator for p in row.values()))
+        factors = {state: p.numerator * (scale // p.denominator) for state, p in row.items()}
+        return cls(factors, constant.numerator * (scale // constant.denominator), scale)
+
+    def reduce(self) -> None:
+        """Divide by what all numbers have in common."""
+        common = gcd(self.scale, self.constant, *self.factors.values())
+        if common > 1:
+            self.scale //= common
+            self.constant //= common
+            self.factors = {state: factor // common for state, factor in self.factors.items()}
+
+    def without(self, pivot: int, other: _Equation) -> None:
+        """Put the value that another equation gives a state in its place."""
+        factor = self.factors.pop(pivot)
+        common = gcd(factor, other.scale)
+        factor, times = factor // common, other.scale // common
+        factors = {state: times * each for state, each in self.factors.items()}
+        for state, each in other.factors.items():
+            factors[state] = factors.get(state, 0) + factor * each
+        self.factors = factors
+        self.constant = times * self.constant + factor * other.constant
+        self.scale *= times
+        self.reduce()
+
+
 def _eliminate(
     rows: dict[int, Row],
     constant: dict[int, Fraction],
@@ -162,6 +201,7 @@ def _eliminate(
     look: Callable[[], None],
 ) -> bool:
     """Put the solution of one component into ``values``; False if it is too much work."""
+    equations = {state: _Equation.of(row, constant[state]) for state, row in rows.items()}
     users: dict[int, set[int]] = {state: set() for state in rows}
     for state, row in rows.items():
         for successor in row:
@@ -171,7 +211,7 @@ def _eliminate(
     buckets: dict[int, dict[int, None]] = {}
 
     def degree(state: int) -> int:
-        return len(rows[state]) * len(users[state])
+        return len(equations[state].factors) * len(users[state])
 
     place = {state: degree(state) for state in rows}
     for state in sorted(rows):
@@ -184,23 +224,19 @@ def _eliminate(
         pivot = next(iter(buckets[lowest]))
         del buckets[lowest][pivot]
         left -= 1
-        row = rows[pivot]
-        scale = 1 / (1 - row.pop(pivot, _ZERO))
+        own = equations[pivot]
+        own.scale -= own.factors.pop(pivot, 0)
+        own.reduce()
         users[pivot].discard(pivot)
-        for successor in row:
-            row[successor] *= scale
+        for successor in own.factors:
             users[successor].discard(pivot)
-        constant[pivot] *= scale
         order.append(pivot)
-        touched = set(users[pivot]) | set(row)
+        touched = set(users[pivot]) | own.factors.keys()
         for user in users[pivot]:
-            factor = rows[user].pop(pivot)
-            other = rows[user]
-            work += len(row) + 1
-            for successor, p in row.items():
-                other[successor] = other.get(successor, _ZERO) + factor * p
+            work += len(own.factors) + 1
+            equations[user].without(pivot, own)
+            for successor in own.factors:
                 users[successor].add(user)
-            constant[user] += factor * constant[pivot]
         if most_work is not None and work > most_work:
             return False
         for state in sorted(touched):
@@ -208,5 +244,7 @@ def _eliminate(
             place[state] = degree(state)
             buckets.setdefault(place[state], {})[state] = None
     for state in reversed(order):
-        values[state] = weighted(((p, values[t]) for t, p in rows[state].items()), constant[state])
+        own = equations[state]
+        known = ((factor, values[other]) for other, factor in own.factors.items())
+        values[state] = weighted(known, own.constant) / own.scale
     return True

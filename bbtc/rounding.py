@@ -72,3 +72,9 @@ def decimal(value: Fraction, places: int) -> str:
     context = Context(prec=places, Emax=MAX_EMAX, Emin=MIN_EMIN)
     quotient = context.divide(Decimal(value.numerator), Decimal(value.denominator))
     return f"{quotient.normalize(context):.{places}g}"
+
+
+def brief(value: Fraction, digits: int = 25) -> str:
+    """A probability that somebody may want to compare: a fraction where its denominator has no more digits,
+    else twelve decimals marked ``≈``."""
+    return str(value) if value.denominator < 10**digits else f"≈ {decimal(value, 12)}"

@@ -11,16 +11,10 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
-from bbtc.artefacts import numbers_json
+from bbtc.artefacts import duration_json, numbers_json
 from bbtc.artefacts.bodies_json import body_to_json
 from bbtc.artefacts.conditions import condition_to_json, number_of
 from bbtc.artefacts.cursor import At, Faults, check_distinct, clip, optional, run_reader
-from bbtc.artefacts.duration_json import (
-    duration_from_json,
-    duration_to_json,
-    may_time_out,
-    timeout_from_json,
-)
 from bbtc.artefacts.hidden_json import (
     HiddenReader,
     component_to_json,
@@ -148,7 +142,7 @@ def _action_to_json(action: GroundAction, task: Task) -> Json:
     if action.uninterruptible:
         value["uninterruptible"] = True
     if action.duration is not None:
-        value["duration"] = duration_to_json(action.duration)
+        value["duration"] = duration_json.duration_to_json(action.duration)
     if action.timeout is not None:
         value["timeout"] = given_text(action.timeout)
     if action.during is not None:
@@ -443,7 +437,7 @@ class _Reader(HiddenReader):
         schema, args = members["schema"].string(), members["args"].strings()
         _check_name(members["name"], schema, args)
         factors = self.chance(at, members)
-        if not may_time_out(factors, "timeout" in members):
+        if not duration_json.may_time_out(factors, "timeout" in members):
             message = "outcomes of a time-out belong into one distribution of an action that has one"
             raise at.fault("BBT0604", message)
         return GroundAction(
@@ -456,8 +450,8 @@ class _Reader(HiddenReader):
             uninterruptible="uninterruptible" in members and members["uninterruptible"].flag(),
             during=self.condition(members["while"]) if "while" in members else None,
             on_abort=self._abort(members["on_abort"]) if "on_abort" in members else (),
-            duration=duration_from_json(members["duration"]) if "duration" in members else None,
-            timeout=timeout_from_json(members["timeout"]) if "timeout" in members else None,
+            duration=duration_json.duration_from_json(members["duration"]) if "duration" in members else None,
+            timeout=duration_json.timeout_from_json(members["timeout"]) if "timeout" in members else None,
         )
 
     def _abort(self, at: At) -> tuple[Factor, ...]:

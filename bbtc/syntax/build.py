@@ -14,7 +14,16 @@ from bbtc.kleene import Truth
 from bbtc.source import Span
 from bbtc.syntax import ast, leaves
 from bbtc.syntax.engine import Token
-from bbtc.syntax.expressions import Expressions, Operand, keyword, numeric, parameters_of, unsupported
+from bbtc.syntax.expressions import (
+    DRAWN,
+    Expressions,
+    Operand,
+    keyword,
+    numeric,
+    parameters_of,
+    seconds,
+    unsupported,
+)
 from bbtc.syntax.fields import (
     Before,
     Body,
@@ -40,6 +49,7 @@ from bbtc.syntax.fields import (
     TimeoutProbability,
     Uninterruptible,
     observed,
+    timing_of,
 )
 from bbtc.syntax.leaves import Misuse
 
@@ -53,14 +63,6 @@ _GOALS: Mapping[str, Literal["goal-probability", "goal-reward"]]
 _GOALS = {"GOAL_PROBABILITY": "goal-probability", "GOAL_REWARD": "goal-reward"}
 _CONTROLS: Mapping[str, Literal["sequence", "fallback", "skipper"]]
 _CONTROLS = {"SEQUENCE": "sequence", "FALLBACK": "fallback", "SKIPPER": "skipper"}
-
-
-_DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[str, ...]]] = {
-    "uniform": ("uniform", ("least", "greatest")),
-    "triangular": ("triangular", ("least", "likeliest", "greatest")),
-    "lognormal": ("lognormal", ("median", "sigma")),
-}
-"""Distributions of durations, and what numbers they take."""
 
 
 _HOW_LONG = "write `(= ?duration n)`; or use an `:action`, with `:duration (uniform a b)` for one that varies"
@@ -213,7 +215,7 @@ class Builder(Expressions):
             fields.get(Uninterruptible) is True,
             fields.get(During),
             fields.get(OnAbort),
-            _timing(fields, head.to(close)),
+            timing_of(fields, head.to(close)),
         )
 
     def exogenous(self, head: Token, name: Token, given: list[Field[object]], close: Token) -> ast.Exogenous:
@@ -313,7 +315,7 @@ class Builder(Expressions):
     ) -> DurativeDuration:
         if variable.text.lower() != "?duration":
             raise Misuse("BBT0101", "a duration is given as `(= ?duration n)`", variable.span)
-        return DurativeDuration(keyword, _seconds(keyword, operand))
+        return DurativeDuration(keyword, seconds(keyword, operand))
 
     def duration_open(self, _: Token, empty: Token) -> DurativeDuration:
         raise Misuse("BBT0449", "an action that takes any time is not supported", empty.span, _HOW_LONG)
@@ -324,16 +326,16 @@ class Builder(Expressions):
         )
 
     def duration(self, keyword: Token, operand: Operand) -> Duration:
-        expression = _seconds(keyword, operand)
+        expression = seconds(keyword, operand)
         return Duration(keyword, ast.Duration("number", (expression,), (), expression.span))
 
     def duration_drawn(self, field: Token, head: Token, operands: list[Operand], close: Token) -> Duration:
         word = keyword(head)
-        kind, wanted = _DRAWN[word]
+        kind, wanted = DRAWN[word]
         if len(operands) != len(wanted):
             message = f"`{word}` takes {len(wanted)} numbers: `({word} {' '.join(wanted)})`"
             raise Misuse("BBT0443", message, head.to(close))
-        amounts = tuple(_seconds(head, operand) for operand in operands)
+        amounts = tuple(seconds(head, operand) for operand in operands)
         return Duration(field, ast.Duration(kind, amounts, (), head.to(close)))
 
     def duration_empirical(
@@ -349,10 +351,10 @@ class Builder(Expressions):
     def duration_point(
         self, head: Token, operand: Operand, number: Token, _: Token
     ) -> tuple[ast.NumericExpression, ast.Number]:
-        return _seconds(head, operand), self.number(number)
+        return seconds(head, operand), self.number(number)
 
     def timeout(self, keyword: Token, operand: Operand) -> Timeout:
-        return Timeout(keyword, _seconds(keyword, operand))
+        return Timeout(keyword, seconds(keyword, operand))
 
     def timeout_probability(self, keyword: Token, number: Token) -> TimeoutProbability:
         return TimeoutProbability(keyword, self.number(number))
@@ -543,26 +545,6 @@ class Builder(Expressions):
 
     def unsupported_section(self, head: Token, _forms: list[None], close: Token) -> ast.Unsupported:
         return unsupported(keyword(head), head, close)
-
-
-def _timing(fields: Fields, span: Span) -> ast.Timing | None:
-    duration, timeout = fields.get(Duration), fields.get(Timeout)
-    chance, effect = fields.get(TimeoutProbability), fields.get(OnTimeout)
-    given = any(each is not None for each in (duration, timeout, chance, effect))
-    return ast.Timing(duration, timeout, chance, effect, span) if given else None
-
-
-def _seconds(head: Token, operand: Operand) -> ast.NumericExpression:
-    """A number of seconds."""
-    expression = numeric(operand)
-    if expression is None:
-        span = operand.span if isinstance(operand, ast.Unsupported) else head.span
-        message, hint = (
-            "this is no number of seconds",
-            "a number, or a function that `:init` gives: `(time ?a ?b)`",
-        )
-        raise Misuse("BBT0101", message, span, hint)
-    return expression
 
 
 def _state_variable(

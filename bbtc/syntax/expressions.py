@@ -17,6 +17,14 @@ from bbtc.syntax.engine import Token
 from bbtc.syntax.hints import CONNECTIVES, NOT_IN_EFFECT, nearest
 from bbtc.syntax.leaves import Misuse
 
+DRAWN: Mapping[str, tuple[Literal["uniform", "triangular", "lognormal"], tuple[str, ...]]] = {
+    "uniform": ("uniform", ("least", "greatest")),
+    "triangular": ("triangular", ("least", "likeliest", "greatest")),
+    "lognormal": ("lognormal", ("median", "sigma")),
+}
+"""Distributions of durations, and what numbers they take."""
+
+
 _WHENS: Mapping[str, ast.Moment] = {"AT_START": "at start", "OVER_ALL": "over all", "AT_END": "at end"}
 Operand: TypeAlias = ast.Term | ast.NumericExpression | ast.Unsupported
 
@@ -70,6 +78,19 @@ def numeric(operand: Operand) -> ast.NumericExpression | None:
             return ast.FluentRef(operand, (), operand.span)
         case _:
             return None
+
+
+def seconds(head: Token, operand: Operand) -> ast.NumericExpression:
+    """A number of seconds."""
+    expression = numeric(operand)
+    if expression is None:
+        span = operand.span if isinstance(operand, ast.Unsupported) else head.span
+        message, hint = (
+            "this is no number of seconds",
+            "a number, or a function that `:init` gives: `(time ?a ?b)`",
+        )
+        raise Misuse("BBT0101", message, span, hint)
+    return expression
 
 
 def _as_term(operand: Operand) -> ast.Term | None:

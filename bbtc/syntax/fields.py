@@ -142,3 +142,11 @@ def observed(formulas: list[ast.Formula]) -> ast.Observation:
     span = Span(first.source, first.start, last.end)
     content = formulas[0] if len(formulas) == 1 else ast.And(tuple(formulas), span)
     return ast.Observation(content, span)
+
+
+def timing_of(fields: Fields, span: Span) -> ast.Timing | None:
+    """What the fields of an action say of time, if anything."""
+    duration, timeout = fields.get(Duration), fields.get(Timeout)
+    chance, effect = fields.get(TimeoutProbability), fields.get(OnTimeout)
+    given = any(each is not None for each in (duration, timeout, chance, effect))
+    return ast.Timing(duration, timeout, chance, effect, span) if given else None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
-from bbtc.rounding import decimal
+from bbtc.rounding import brief, decimal
 from bbtc.tree.nodes import Tree
 from bbtc.verifier import storm
 from bbtc.verifier.chain import chain_of, solvable_chain
@@ -28,8 +28,6 @@ Engine: TypeAlias = Literal["auto", "own", "storm", "all"]
 TOLERANCE = Fraction(1, 10**9)
 """The greatest difference between a claim and what Storm found; of our own solver, which is exact, none
 is taken."""
-
-_LONGEST = 10**25  # denominator of a number shown as a fraction
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,14 +142,14 @@ class _Looked:
 def _problems(tree: Tree, looked: _Looked) -> Iterator[Diagnostic]:
     claimed, own, found, worlds = tree.success_probability, looked.own, looked.storm, looked.worlds
     if looked.success is not None and not looked.success[0] <= claimed <= looked.success[1]:
-        told = " or ".join(dict.fromkeys(_shown(bound) for bound in looked.success))
-        yield _disagreement(f"the tree claims a success probability of {_shown(claimed)}; it is {told}")
+        told = " or ".join(dict.fromkeys(brief(bound) for bound in looked.success))
+        yield _disagreement(f"the tree claims a success probability of {brief(claimed)}; it is {told}")
     if found is not None:
         least = found.success.lower or Fraction(0)
         short = claimed - least > TOLERANCE if looked.hidden else not _agree(found.success, claimed)
         if short:
             yield _disagreement(
-                f"the tree claims a success probability of {_shown(claimed)}; Storm finds {_shown(least)}"
+                f"the tree claims a success probability of {brief(claimed)}; Storm finds {brief(least)}"
             )
     if own is not None and found is not None:
         for name, answer in found.figures:
@@ -180,13 +178,13 @@ def _contradictions(tree: Tree) -> Iterator[Diagnostic]:
     contradicted = tree.status == ("out-of-reach" if claimed >= tree.target else "target-reached")
     if contradicted:
         yield _disagreement(
-            f"the status is '{tree.status}', but the target is {_shown(tree.target)} and the claim "
-            f"{_shown(claimed)}"
+            f"the status is '{tree.status}', but the target is {brief(tree.target)} and the claim "
+            f"{brief(claimed)}"
         )
     claimed = tree.success_probability
     if tree.bounds is not None and claimed > tree.bounds[1]:
         yield _disagreement(
-            f"the tree claims {_shown(claimed)}, more than the {_shown(tree.bounds[1])} that it says any "
+            f"the tree claims {brief(claimed)}, more than the {brief(tree.bounds[1])} that it says any "
             "policy can reach"
         )
 
@@ -195,7 +193,7 @@ def _unsound(own: Recomputed, hidden: bool) -> Sequence[Diagnostic]:
     found = []
     if own.without_goal and not hidden:
         found.append(
-            f"with probability {_shown(own.without_goal)} the tree succeeds where the goal is not true"
+            f"with probability {brief(own.without_goal)} the tree succeeds where the goal is not true"
         )
     if own.unready:
         found.append("an action can start where its precondition is not true")
@@ -204,7 +202,3 @@ def _unsound(own: Recomputed, hidden: bool) -> Sequence[Diagnostic]:
 
 def _disagreement(message: str) -> Diagnostic:
     return Diagnostic("BBT0801", message)
-
-
-def _shown(value: Fraction) -> str:
-    return str(value) if value.denominator < _LONGEST else f"≈ {decimal(value, 12)}"

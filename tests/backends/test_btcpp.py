@@ -84,9 +84,9 @@ def check_nodes(tree: ET.Element, entries: dict[str, ET.Element], tree_ids: set[
             model = entries.get(node.attrib["ID"])
             assert own == ({port.attrib["name"] for port in model} if model is not None else set())
             assert not any(re.match(r"[0-9.+-]", node.attrib[port]) for port in own)
-        elif node.tag in ("Skipper", "Latch", "Held", "Committed"):
+        elif node.tag in ("Skipper", "Latch", "Held", "While", "Committed"):
             assert own <= {port.attrib["name"] for port in entries[node.tag].iter("input_port")}
-            assert len(node) == 1 if node.tag in ("Held", "Committed") else len(node) >= 1
+            assert len(node) == 1 if node.tag in ("Held", "While", "Committed") else len(node) >= 1
         elif node.tag in entries:
             assert own == {port.attrib["name"] for port in entries[node.tag].iter("input_port")}
             assert len(node) == 0

@@ -115,6 +115,8 @@ def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
     assert size(small) <= most
     assert size(done) <= min(most, allowance(size(small)))
     assert done.success_probability >= small.tree.success_probability
+    if of.numbers:  # which the other two do not know
+        return
     slow = None if LONG else SLOW.get(str(problem))
     if slow != "search":
         searched = plan(of, "search", prefer="size")

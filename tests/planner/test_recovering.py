@@ -76,7 +76,10 @@ def test_trees_of_our_domains_recover(problem: Problem) -> None:
     of = task_of(problem)
     if of.endless_beliefs:
         pytest.skip("there is no end to what may be believed")
-    if problem.domain in LARGE and problem.name != "after-the-alarm":
+    large = problem.domain in LARGE and problem.name != "after-the-alarm"
+    if (
+        large or problem.name == "letter-upstairs"
+    ):  # whose states, and those within events, exceed small limits
         pytest.skip("too many states for each")
     done, _ = told(problem)
     found = recovery(of, done.tree.root, Limits())

@@ -17,7 +17,9 @@ import pytest
 
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.names import btcpp_names
+from bbtc.backends.interface import BOUNDS
 from bbtc.ground.task import ground_name
+from bbtc.replay.engines import number_in_world
 from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld, Timing, World
 from bbtc.tree.nodes import Tree
 from tests.replay.ticks import Tick, TickScript, TickWorld
@@ -120,7 +122,7 @@ class CompiledReplay:
         file.write_text(self.source, encoding="utf-8")
         main = self.source.split('main_tree_to_execute="')[1].split('"')[0]
         nodes = [
-            f"{kind}:{names.ids[leaf.symbol]}:{','.join(leaf.parameters)}"
+            f"{kind}:{names.ids[leaf.symbol]}:{','.join([*leaf.parameters, *BOUNDS[: 2 * leaf.counts]])}"
             for kind, found in (
                 ("condition", names.interface.conditions),
                 ("action", names.interface.actions),
@@ -152,7 +154,11 @@ class CompiledReplay:
 
     def run(self, script: Script, timing: Timing = "between") -> Run:
         """Replay one script in a new instance of the tree."""
-        world = self.world = ScriptedWorld(self._task, script, timing)
+        return self.run_in(ScriptedWorld(self._task, script, timing))
+
+    def run_in(self, world: ScriptedWorld) -> Run:
+        """What a new instance of the tree does in a world."""
+        self.world = world
         if self._waiting:
             self._answer("0")
         for _ in range(world.most_ticks()):
@@ -190,6 +196,12 @@ class CompiledReplay:
         if kind == "G":
             return self._acted(world, world.go_on(node))
         symbol = self._symbols[rest[1]]
+        if symbol.kind == "function":
+            *args, least, most = rest[2:]
+            name = ground_name(symbol.name, tuple(self._objects[value] for value in args))
+            number = number_in_world(self._task, world, name)
+            fits = (least == "-" or number >= int(least)) and (most == "-" or number <= int(most))
+            return "2" if fits else "0"
         name = ground_name(symbol.name, tuple(self._objects[value] for value in rest[2:]))
         if kind == "C":
             return str(world.read(name))

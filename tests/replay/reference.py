@@ -171,6 +171,11 @@ class Running(Ticking):
     def act(self, node: ActionNode) -> str:
         """The status of an action node, which calls its action if it runs or may start."""
         if node is self.runs:
+            during = self.task.action_by_name[node.action].during
+            if during is not None and value_of(during, self.world.values) != "T":
+                self.called = True
+                self._cancel()
+                return "running"
             self._call(node, self.world.go_on(node.id))
             return "running"
         if node.id in self.failed:

@@ -20,7 +20,7 @@ from bbtc.tree.nodes import Tree
 from tests.domains.problems import PROBLEMS, Problem, task_of, tree_of
 from tests.long_form import amount
 from tests.replay.all_engines import ENGINES, Compared, EngineName, engine, part_for
-from tests.replay.random_trees import busy_tree
+from tests.replay.random_trees import busy_tree, random_condition
 from tests.replay.reference import Running, expected_ticks, value_of
 from tests.replay.ticks import Tick, TickScript, TickWorld, random_script, trace
 from tests.sharing import shared
@@ -47,12 +47,13 @@ def _scripted(seed: int, endless: bool) -> tuple[Tree, list[tuple[TickScript, li
 
 def with_other_actions(tree: Tree, rng: random.Random) -> Tree:
     """The tree with half of the actions doing nothing in the model, so that others do what changes while they
-    run, and some that nothing interrupts."""
+    run, some that nothing interrupts, and some that go on while something is true."""
     actions = tuple(
         replace(
             action,
             factors=(NO_CHANGE,) if rng.random() < 0.5 else action.factors,
             uninterruptible=rng.random() < 0.15,
+            during=random_condition(rng, tree.task.variables, 1) if rng.random() < 0.25 else None,
         )
         for action in tree.task.actions
     )

@@ -26,7 +26,7 @@ from tests.long_form import LONG, amount
 from tests.timing.test_durations import drawn
 
 F = Fraction
-RUNS = amount(4_000, 1_000_000)
+RUNS = amount(3_000, 1_000_000)
 BAND = math.sqrt(math.log(2 / 0.01) / (2 * RUNS))
 """Dvoretzky, Kiefer, Wolfowitz (Massart 1990): with 99 % the empirical curve is nowhere farther off."""
 
@@ -219,7 +219,7 @@ def compared(tree: Tree, seed: int) -> None:
         )
 
 
-@pytest.mark.parametrize("seed", range(amount(12, 200)))
+@pytest.mark.parametrize("seed", range(amount(8, 200)))
 def test_the_curves_hold_what_runs_attain(seed: int) -> None:
     generator = random.Random(seed)
     for _ in range(50):

@@ -20,15 +20,16 @@ from bbtc.backends.btcpp.conditions import ConditionWriter
 from bbtc.backends.btcpp.holding import Holding, Ports
 from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile, forgotten, full_again
 from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, ports_for, shown
-from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE, condition_below, notes, template_label
+from bbtc.backends.btcpp.notes import CLAIM, DIGITS, TEMPLATE, condition_below, notes, template_label
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.backends.btcpp.palette import node_model
 from bbtc.backends.commitment import Fact, facts_read, first_variable
 from bbtc.backends.exporter import Figures, Option, OptionValue
-from bbtc.backends.interface import action_symbol, guard_of, variable_symbol
+from bbtc.backends.interface import action_symbol, during_of, guard_of, variable_symbol
 from bbtc.backends.shape import fit, written
-from bbtc.ground.condition import TRUE, And, Condition, Or, variables
+from bbtc.ground.condition import TRUE, And, Condition, Or, conjunction, variables
 from bbtc.ground.task import GroundAction, Task, ground_name, split_name
+from bbtc.rounding import brief
 from bbtc.tree.deep import Deep, unwind
 from bbtc.tree.nodes import (
     ActionNode,
@@ -146,7 +147,7 @@ class _Writer:
         return document
 
     def _headline(self) -> str:
-        task, claim = self.task, self.tree.success_probability
+        task, claim = self.task, brief(self.tree.success_probability, DIGITS)
         unbounded = " Nothing bounds how often it tries." if tries_without_end(self.tree.root) else ""
         return shown(f"{task.domain}, {task.problem}: {CLAIM}{claim}.{unbounded} Made by bbtc.")
 
@@ -250,7 +251,7 @@ class _Writer:
             elif isinstance(node, ActionNode):
                 action = self.task.action_by_name[node.action]
                 uses += self._ports(action)
-                read = guard_of(self.task, node) or TRUE
+                read = conjunction((guard_of(self.task, node) or TRUE, during_of(self.task, node) or TRUE))
                 facts += self.holding.by_action.get(node.action, ())
             facts += facts_read(self.task, read)
             for variable in (self.task.variables[index] for index in variables(read)):
@@ -287,7 +288,7 @@ class _Writer:
         if self.profile == "bbtc":
             tag = self._limited(self._leaf(action, place.ports), action)
             needed = self._start_conditions(guard, place.ports, place.counters)
-            element = self.idioms.latch(tag, needed, node.latched)
+            element = self.idioms.latch(tag, needed, node.latched, self._during(node, place.ports))
             given = {"name": label, "entry": entry, "sets": self.holding.named(held, args)}
             element.attrib |= {name: value for name, value in given.items() if value}
             return element
@@ -326,10 +327,11 @@ class _Writer:
         title = self.names.plain[action_symbol(action)]
         often = "Again" if not node.latched else "Once" if entry is None else "OnceAnAttempt"
         title += often + ("WhenReady" if guard is not None or counters else "")
+        during = self._during(node, ports)
         if entry is not None:
-            content = self.idioms.latched(tag, needed, entry)
+            content = self.idioms.latched(tag, needed, during, entry)
         else:
-            content = (self.idioms.latched if node.latched else self.idioms.unlatched)(tag, needed)
+            content = (self.idioms.latched if node.latched else self.idioms.unlatched)(tag, needed, during)
         key, ports = (title, tostring(content)), ports.used_in(content)
         if key not in self.action_trees:
             tree_id = self.tree_ids.take(title, seed=repr(key))
@@ -337,6 +339,13 @@ class _Writer:
             self.action_trees[key].append(content)
             self.subtree_ports[tree_id] = (*passed, *ports.facts.values())
         return self.action_trees[key].attrib["ID"], ports
+
+    def _during(self, node: ActionNode, ports: Ports) -> Element | None:
+        """What must stay true while the action goes on, read as it is."""
+        during = during_of(self.task, node)
+        if during is None:
+            return None
+        return self.conditions.write(written(self.task, during), replace(ports, live=True))
 
     def _start_conditions(
         self, guard: Condition | None, ports: Ports, counters: tuple[str, ...], held: Sequence[Fact] = ()

@@ -19,7 +19,7 @@ from bbtc.tree.nodes import ControlKind
 
 Profile: TypeAlias = Literal["stock", "bbtc"]
 
-SKIPPER, LATCH, HELD, COMMITTED = "Skipper", "Latch", "Held", "Committed"
+SKIPPER, LATCH, HELD, COMMITTED, WHILE = "Skipper", "Latch", "Held", "Committed", "While"
 """Ids of our own nodes: two control nodes, and what stands around leaves and around the tree."""
 
 UNTIL_SUCCESS = "RetryUntilSuccessful"
@@ -32,6 +32,7 @@ _RETRY_LABEL = re.compile("at most [0-9]+ attempts?")
 
 BLOCKED_LABEL = "until blocked"
 HOLD_LABEL = "hold what it may set"
+WHILE_LABEL = "goes on while"
 WHEN_READY_LABEL = "start when ready"
 
 
@@ -167,14 +168,23 @@ class Idioms:
             needed[-1].set("name", HOLD_LABEL)
         return needed
 
-    def latch(self, action: Element, needed: Sequence[Element], latched: bool) -> Element:
+    def latch(
+        self, action: Element, needed: Sequence[Element], latched: bool, during: Element | None = None
+    ) -> Element:
         """The action with our node Latch, which does what :meth:`latched` or :meth:`unlatched` does."""
-        element = _around(LATCH, [*needed, action])
+        goes_on = [] if during is None else [decorated(WHILE, during)]
+        element = _around(LATCH, [*needed, *goes_on, action])
         if not latched:
             element.set("keep", "false")
         return element
 
-    def latched(self, action: Element, needed: Sequence[Element], entry: str = "_latch") -> Element:
+    def latched(
+        self,
+        action: Element,
+        needed: Sequence[Element],
+        during: Element | None = None,
+        entry: str = "_latch",
+    ) -> Element:
         """Runs the action once. Its status is withheld until the next tick, because conditions to the
         left were read before its effect; then it is kept. Halted after its start counts as run."""
         latch = Element("Switch2", variable=f"{{{entry}}}", case_1="success", case_2="failure")
@@ -184,14 +194,14 @@ class Idioms:
             action.set(event, f"{entry} := '{status}'; {self.running} := false")
         # With memory: once the action runs, its own effect may end its precondition.
         started = SubElement(latch, "Sequence", name=WHEN_READY_LABEL)
-        started.extend([*needed, self._running(action, "")])
+        started.extend([*needed, self._running(action, "", during)])
         return latch
 
-    def unlatched(self, action: Element, needed: Sequence[Element]) -> Element:
+    def unlatched(self, action: Element, needed: Sequence[Element], during: Element | None = None) -> Element:
         """Runs the action whenever it is ticked, again and again."""
         for event in ("_onSuccess", "_onFailure", "_onHalted"):
             action.set(event, f"_started := 'no'; {self.running} := false")
-        running = self._running(action, "; _started := 'yes'")
+        running = self._running(action, "; _started := 'yes'", during)
         ready = Element("Switch2", variable="{_started}", case_1="yes", case_2="never")
         SubElement(ready, "AlwaysSuccess")
         SubElement(ready, "AlwaysFailure")
@@ -199,10 +209,16 @@ class Idioms:
         running.insert(0, ready)
         return running
 
-    def _running(self, action: Element, more: str) -> Element:
+    def _running(self, action: Element, more: str, during: Element | None) -> Element:
+        """The action, which tells that it runs, and is halted where ``during`` is no longer true."""
         script = f"@{self.acting} := true; {self.running} := true{more}"
         keep = decorated("KeepRunningUntilFailure", decorated("ForceSuccess", action))
-        return self.control("sequence", [Element("Script", code=script), keep])
+        started = [Element("Script", code=script), keep]
+        if during is not None:
+            begins = Element("ScriptCondition", code=f"!{self.running}")
+            started.insert(0, self.control("fallback", [begins, during, self.control("skipper", [])]))
+            started[0].set("name", WHILE_LABEL)
+        return self.control("sequence", started)
 
     # --- what is held ------------------------------------------------------------------------
 

@@ -176,11 +176,8 @@ class NAME : public BT::ConditionNode {
 """
 
 _BETWEEN = """\
-/// The value of a port that holds a whole number; nothing where it is not given.
-inline std::optional<int> bound(const BT::TreeNode& node, const std::string& port) {
-  if (node.config().input_ports.count(port) == 0) {
-    return std::nullopt;
-  }
+/// The value of a port that holds a whole number.
+inline int bound(const BT::TreeNode& node, const std::string& port) {
   const auto value = node.getInput<int>(port);
   if (!value) {
     throw BT::RuntimeError(node.name(), ": ", value.error());
@@ -193,9 +190,7 @@ inline BT::NodeStatus between(const BT::TreeNode& node, std::optional<int> value
   if (!value) {
     return BT::NodeStatus::RUNNING;
   }
-  const std::optional<int> least = bound(node, "at_least");
-  const std::optional<int> most = bound(node, "at_most");
-  const bool inside = (!least || *least <= *value) && (!most || *value <= *most);
+  const bool inside = bound(node, "at_least") <= *value && *value <= bound(node, "at_most");
   return inside ? BT::NodeStatus::SUCCESS : BT::NodeStatus::FAILURE;
 }
 """
@@ -425,8 +420,11 @@ class LeafWriter:
         head = _LEAVES if self._monitor is None else _LEAVES.replace(ACCESS, MONITOR_ACCESS)
         if self._program.our_nodes:
             head = head.replace('#include "robot.hpp"', '#include "bbtc_nodes.hpp"\n#include "robot.hpp"')
+        counts = any(leaf.counts for leaf in self.leaves())
+        if counts:
+            head = head.replace("#include <functional>\n", "#include <functional>\n#include <limits>\n")
         blocks = [cppcode.fill(head, **words)]
-        blocks += [_BETWEEN] if any(leaf.counts for leaf in self.leaves()) else []
+        blocks += [_BETWEEN] if counts else []
         blocks += [self._class(leaf) for leaf in self.leaves()]
         body = [
             f"  factory.registerNodeType<{self.class_name(leaf)}>"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from bbtc.backends.btcpp.bindings.bound import BoundNodes, bound_nodes
 from bbtc.backends.btcpp.bindings.entries import Bindings
-from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER
+from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, WHILE
 from bbtc.backends.interface import Interface, Leaf, interface_of
 from bbtc.backends.names import Namer, Symbol, camel, identifiers, port_values
 from bbtc.ground.task import Task
@@ -24,7 +24,7 @@ RESERVED = frozenset(
     SetBlackboard SkipUnlessUpdated Sleep SubTree SubTreePlus Switch2 Switch3 Switch4 Switch5 Switch6
     Timeout TryCatch UnsetBlackboard WaitValueUpdate WasEntryUpdated WhileDoElse EntryUpdated
     ConsumeQueue PopFromQueue QueueSize ManualSelector TestNode Root BehaviorTree TreeNodesModel Include
-    Action Condition Control Decorator {SKIPPER} {LATCH} {HELD} {COMMITTED}
+    Action Condition Control Decorator {SKIPPER} {LATCH} {HELD} {COMMITTED} {WHILE}
     """.split()
 )
 """Ids with a meaning of their own in BehaviorTree.CPP 4 files, and those of our own nodes."""

@@ -37,6 +37,8 @@ TEMPLATE = "template"
 """The first word of the description of a BehaviorTree that stands for a template."""
 
 CLAIM = "succeeds with probability "
+DIGITS = 300
+"""How many digits the parts of a claim may have that is written, and read, exactly."""
 """What stands before the claimed figure in the description of the main tree."""
 
 VERSION = 1

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from bbtc.backends.btcpp import cppcode
 from bbtc.backends.btcpp.bindings.bound import BINDINGS, bindings_of
-from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, Profile
+from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, WHILE, Profile
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
 from bbtc.backends.exporter import Figures, Option, OptionValue
@@ -73,14 +73,20 @@ def _entry(
     element = SubElement(model, kind, ID=names.ids[leaf.symbol])
     for port, text in zip(leaf.parameters, _port_text(names, objects, leaf), strict=True):
         SubElement(element, "input_port", name=port, type="std::string").text = text or None
-    for port, text in _bounds(leaf):
-        SubElement(element, "input_port", name=port, type="int").text = text
+    for port, value, _, text in _bounds(leaf):
+        SubElement(element, "input_port", name=port, type="int", default=str(value)).text = text
     SubElement(element, "description").text = meaning(leaf)
 
 
-def _bounds(leaf: Leaf) -> list[tuple[str, str]]:
-    """What a number is compared with, and what is said of that."""
-    return [(BOUNDS[0], "the least value"), (BOUNDS[1], "the greatest value")] if leaf.counts else []
+def _bounds(leaf: Leaf) -> list[tuple[str, int, str, str]]:
+    """What a number is compared with: the port, what it holds where nothing is given (any number the engine
+    can hold lies within), that in C++, and what is said of it."""
+    if not leaf.counts:
+        return []
+    return [
+        (BOUNDS[0], -(2**31), "std::numeric_limits<int>::min()", "the least value"),
+        (BOUNDS[1], 2**31 - 1, "std::numeric_limits<int>::max()", "the greatest value"),
+    ]
 
 
 def port_code(task: Task, names: BtcppNames, leaf: Leaf) -> str:
@@ -90,8 +96,8 @@ def port_code(task: Task, names: BtcppNames, leaf: Leaf) -> str:
         for port, text in zip(leaf.parameters, _port_text(names, _objects(task), leaf), strict=True)
     ]
     ports += [
-        f"BT::InputPort<int>({cppcode.literal(port)}, {cppcode.literal(text)})"
-        for port, text in _bounds(leaf)
+        f"BT::InputPort<int>({cppcode.literal(port)}, {code}, {cppcode.literal(text)})"
+        for port, _, code, text in _bounds(leaf)
     ]
     return f"{{{', '.join(ports)}}}"
 
@@ -144,6 +150,8 @@ def _our_nodes(model: Element) -> None:
     ).text = (
         "What the condition returned before the running action began, if that sets it; or what it returns."
     )
+    goes_on = SubElement(model, "Decorator", ID=WHILE)
+    SubElement(goes_on, "description").text = "In a Latch, before its action: it goes on while this is so."
     committed = SubElement(model, "Decorator", ID=COMMITTED)
     SubElement(committed, "description").text = (
         "The root: knows which action runs, is RUNNING where the tick passes that by, and fails where the "

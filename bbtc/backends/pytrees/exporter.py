@@ -13,7 +13,14 @@ from typing_extensions import assert_never
 
 from bbtc.backends.commitment import Fact, first_variable, held_by
 from bbtc.backends.exporter import Figures, Option, OptionValue
-from bbtc.backends.interface import Interface, action_symbol, guard_of, interface_of, variable_symbol
+from bbtc.backends.interface import (
+    Interface,
+    action_symbol,
+    during_of,
+    guard_of,
+    interface_of,
+    variable_symbol,
+)
 from bbtc.backends.names import PYTHON_RESERVED, Symbol, identifiers
 from bbtc.backends.pytrees.parts import (
     ConditionCode,
@@ -32,6 +39,7 @@ from bbtc.backends.shape import fit, normal, words_of
 from bbtc.ground.condition import Condition
 from bbtc.ground.task import Task
 from bbtc.printable import printable
+from bbtc.rounding import brief
 from bbtc.tree.nodes import (
     ActionNode,
     ConditionNode,
@@ -86,7 +94,7 @@ class _Writer:
         self.embedded = embedded
         self.task: Task = tree.task
         self.monitor = tree.monitor
-        self.claim = tree.success_probability
+        self.claim = brief(tree.success_probability)
         self.root = fit(tree.root, "py_trees")
         self.names = py_trees_names(tree)
         self.conditions = ConditionCode(tree.task.variables)
@@ -220,6 +228,10 @@ class _Writer:
             items.append(Prefixed("guard=", self._test(guard)))
         if not node.latched:
             items.append("keep=False")
+        during = during_of(self.task, node)
+        if during is not None:
+            test = self.conditions.write(during, lambda variable: self._read(variable, "live(robot)"))
+            items.append(Prefixed("during=lambda: ", test))
         if node.action in self.held:
             items.append(f"own=OWN[{literal(node.action)}]")
         return call("Try" if node.id in self.tried else "Latch", *items)
@@ -235,11 +247,11 @@ class _Writer:
     def _test(self, condition: Condition) -> Code:
         return _thunk(self.conditions.write(condition, self._read))
 
-    def _read(self, variable: int) -> Code:
+    def _read(self, variable: int, robot: str = "robot") -> Code:
         read = self.task.variables[variable]
         if self.monitor is not None and variable in self.monitor.known:
-            return call("robot.monitor.value", *map(literal, (read.predicate, *read.args)))
-        return call(f"robot.{self.names.methods[variable_symbol(read)]}", *map(literal, read.args))
+            return call(f"{robot}.monitor.value", *map(literal, (read.predicate, *read.args)))
+        return call(f"{robot}.{self.names.methods[variable_symbol(read)]}", *map(literal, read.args))
 
 
 _FUNCTIONS: dict[ControlKind, str] = {

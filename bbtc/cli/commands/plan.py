@@ -227,7 +227,7 @@ def run_planner(
         search_begins=signals.listen,
         search_ends=search_ends,
     )
-    if plan.tree.status == "stuck":
+    if plan.tree.status == "stuck" and within is None:
         session.report.warning(
             "BBT0502",
             f"the strategy '{strategy}' has nothing left to insert before the target",

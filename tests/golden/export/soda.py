@@ -254,9 +254,9 @@ class WithBeliefs(Protocol):
 
 
 class StopWhenBlocked(Decorator):
-    """The root. It knows the action that runs, and holds what that may itself set, so that an action
-    never ends by what it does. A tick that passes it by cancels it and is RUNNING; all is read anew
-    in the next one.
+    """The root. It knows the action that runs, and holds what that may itself set, so that no
+    action ends by what it does. A tick that passes it by cancels it and is RUNNING; all is read
+    anew in the next one.
 
     FAILURE where the tree is RUNNING but no action is. Something is unknown then that
     nothing can observe, and nothing would ever change. Before its first tick the tree waits,
@@ -289,7 +289,7 @@ class StopWhenBlocked(Decorator):
             self.stop(Status.INVALID)
 
     def acts(self, latch: Latch, own: Iterable[Fact]) -> None:
-        """A latch below is about to run its action in this tick; to start it, if it brings its own."""
+        """A latch below is about to run its action in this tick, after it notes its ``own``."""
         for fact in own:
             ask: Any = self._robot
             for name in fact[0].split("."):

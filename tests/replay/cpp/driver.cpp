@@ -48,7 +48,7 @@ std::string described(const BT::TreeNode& node, const std::vector<std::string>& 
   std::ostringstream text;
   text << node.UID() << ' ' << node.registrationName();
   for (const auto& port : ports) {
-    text << ' ' << node.getInput<std::string>(port).value();
+    text << ' ' << node.getInput<std::string>(port).value_or("-");  // a bound need not be given
   }
   return text.str();
 }

@@ -21,13 +21,11 @@ from bbtc.backends.btcpp.bindings.entries import (
 )
 from bbtc.backends.btcpp.bindings.read import files_of, read_bindings
 from bbtc.backends.exporter import Option, OptionValue
-from bbtc.backends.interface import Interface, Leaf, action_symbol, guard_of, variable_symbol
+from bbtc.backends.interface import Interface, Leaf, action_symbol, variable_symbol, variables_read
 from bbtc.backends.names import Symbol
-from bbtc.backends.shape import normal
 from bbtc.diagnostics import BbtcError, Diagnostic
-from bbtc.ground.condition import TRUE, variables
 from bbtc.ground.task import Signature, Task
-from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, walk
+from bbtc.tree.nodes import Tree, actions_of
 
 BINDINGS = Option(
     "bindings",
@@ -191,14 +189,10 @@ def _unknowable(bound: BoundLeaf, node: NodeBinding) -> Diagnostic:
 def _uses(tree: Tree) -> Uses:
     task = tree.task
     uses: dict[Symbol, dict[tuple[str, ...], None]] = {}
-    read: dict[int, None] = {}
-    for node in walk(tree.root):
-        if isinstance(node, ConditionNode):
-            read.update(dict.fromkeys(variables(normal(task, node.condition))))
-        elif isinstance(node, ActionNode):
-            action = task.action_by_name[node.action]
-            uses.setdefault(action_symbol(action), {})[action.args] = None
-            read.update(dict.fromkeys(variables(guard_of(task, node) or TRUE)))
+    for node in actions_of(tree.root):
+        action = task.action_by_name[node.action]
+        uses.setdefault(action_symbol(action), {})[action.args] = None
+    read = variables_read(tree)
     if tree.monitor is not None:
         read.update(dict.fromkeys(sorted(tree.monitor.seen)))
     for index in read:

@@ -1,4 +1,4 @@
-// Nodes of belief behavior trees for BehaviorTree.CPP 4.6 and later: Skipper, Latch, Held, Committed.
+// Nodes of belief behavior trees for BehaviorTree.CPP 4.6 and later: Skipper, Latch, While, Held, Committed.
 // C++17, this header only. Part of bbtc (Apache-2.0); https://www.apache.org/licenses/LICENSE-2.0
 #ifndef BBTC_NODES_HPP  // not "pragma once": each tree of a program may bring along its own copy
 #define BBTC_NODES_HPP
@@ -29,7 +29,8 @@ struct Commitment {
 };
 
 /// Around a condition: what it returned before the running action began, if that may set it; else what it
-/// returns. It is known by its id and its ports in the order of their names: "At(place=hall)".
+/// returns. It is known by its id and those of its ports that tell more than their default, in the order of
+/// their names: "At(place=hall)".
 class Held : public BT::DecoratorNode {
  public:
   Held(const std::string& name, const BT::NodeConfig& config) : BT::DecoratorNode(name, config) {}
@@ -40,7 +41,10 @@ class Held : public BT::DecoratorNode {
     const BT::TreeNode& leaf = *child();
     std::map<std::string, std::string> ports;
     for (const auto& [port, value] : leaf.config().input_ports) {
-      ports[port] = leaf.getInput<std::string>(port).value();
+      const std::string given = leaf.getInput<std::string>(port).value();
+      if (given != leaf.config().manifest->ports.at(port).defaultValueString()) {
+        ports[port] = given;
+      }
     }
     std::string text = leaf.registrationName() + "(";
     for (const auto& [port, value] : ports) {
@@ -105,6 +109,22 @@ class Skipper : public BT::ControlNode {
   }
 };
 
+/// In a Latch, right before its action: the action goes on while the condition succeeds.
+class While : public BT::DecoratorNode {
+ public:
+  While(const std::string& name, const BT::NodeConfig& config) : BT::DecoratorNode(name, config) {}
+
+  static BT::PortsList providedPorts() { return {}; }
+
+ private:
+  BT::NodeStatus tick() override {
+    setStatus(BT::NodeStatus::RUNNING);
+    const BT::NodeStatus status = child_node_->executeTick();
+    resetChild();
+    return status;
+  }
+};
+
 /// Runs an action, its last child, once: when the action has ended, its status is kept and returned from
 /// the next tick on (conditions further left were read before the action's effect). An action that is
 /// halted after its start counts as run, and successful, because its own effect often is what halts it.
@@ -151,7 +171,12 @@ class Latch : public BT::ControlNode {
       throw BT::LogicError("[", name(), "]: a Latch needs an action");
     }
     setStatus(BT::NodeStatus::RUNNING);
-    if (!started_) {
+    bool goes_on = true;
+    if (started_) {
+      BT::TreeNode* before = childrenCount() < 2 ? nullptr : children_nodes_[childrenCount() - 2];
+      goes_on = before == nullptr || before->registrationName() != "While" ||
+                before->executeTick() == BT::NodeStatus::SUCCESS;
+    } else {
       const BT::NodeStatus ready = readiness();
       if (ready != BT::NodeStatus::SUCCESS) {
         return ready;
@@ -167,7 +192,9 @@ class Latch : public BT::ControlNode {
       // A number, because that is what `:= false` in a Script makes of the entry.
       config().blackboard->set<double>(flag_, 1.0);
     }
-    const BT::NodeStatus status = children_nodes_.back()->executeTick();
+    // An action that does not go on is halted, and counts as run.
+    const BT::NodeStatus status =
+        goes_on ? children_nodes_.back()->executeTick() : BT::NodeStatus::SUCCESS;
     if (status == BT::NodeStatus::SUCCESS || status == BT::NodeStatus::FAILURE) {
       ended(status);
       resetChildren();
@@ -243,6 +270,9 @@ class Latch : public BT::ControlNode {
     for (std::size_t index = 0; index + 1 < childrenCount(); ++index) {
       if (waits && children_nodes_[index]->registrationName() == "Script") {
         return BT::NodeStatus::RUNNING;
+      }
+      if (children_nodes_[index]->registrationName() == "While") {
+        continue;
       }
       const BT::NodeStatus status = children_nodes_[index]->executeTick();
       if (status != BT::NodeStatus::SUCCESS && status != BT::NodeStatus::SKIPPED) {
@@ -323,6 +353,7 @@ inline void registerNodes(BT::BehaviorTreeFactory& factory) {
   };
   add("Skipper", static_cast<Skipper*>(nullptr));
   add("Latch", static_cast<Latch*>(nullptr));
+  add("While", static_cast<While*>(nullptr));
   add("Held", static_cast<Held*>(nullptr));
   add("Committed", static_cast<Committed*>(nullptr));
 }

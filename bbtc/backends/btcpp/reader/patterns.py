@@ -14,7 +14,15 @@ from typing import TypeAlias
 
 from typing_extensions import assert_never
 
-from bbtc.backends.btcpp.idioms import COMMITTED, HELD, HOLD_LABEL, LATCH, SKIPPER, TIMEOUT, UNTIL_SUCCESS
+from bbtc.backends.btcpp.idioms import (
+    COMMITTED,
+    HELD,
+    HOLD_LABEL,
+    LATCH,
+    SKIPPER,
+    UNTIL_SUCCESS,
+    WHILE,
+)
 from bbtc.backends.btcpp.xmltext import XmlElement
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
@@ -183,9 +191,9 @@ def _script(code: Value) -> Shape:
     return Shape("Script", {"code": code})
 
 
-def _running(script: Value, leaf: Hole) -> Shape:
+def _running(script: Value, leaf: Hole, *first: Shape) -> Shape:
     kept = Shape("KeepRunningUntilFailure", {}, (Shape("ForceSuccess", {}, (leaf,)),))
-    return Shape("ReactiveSequence", {}, (_script(script), kept))
+    return Shape("ReactiveSequence", {}, (*first, _script(script), kept))
 
 
 _RUNNING = rf"(?P<running>{_COUNTER})"
@@ -291,19 +299,6 @@ NOT_COMMITTED = Shape(
 )
 """The same of files in which nothing is held while an action runs."""
 
-GIVEN_UP = Shape(
-    "ForceSuccess",
-    {},
-    (
-        Shape(
-            TIMEOUT,
-            {"msec": Pattern(re.compile("(?P<msec>[0-9]{1,13})"), "30000")},
-            (Hole("leaf"),),
-        ),
-    ),
-)
-"""An action that is given up after some time, which counts as its end."""
-
 RETRY = Shape(
     "ReactiveSequence",
     {},
@@ -375,7 +370,19 @@ _SWITCH: dict[str, Value] = {
 }
 
 
-def _actions(*, committed: bool) -> tuple[tuple[Shape, str | None], ...]:
+_GOES_ON = Shape(
+    "ReactiveFallback",
+    {},
+    (
+        Shape("ScriptCondition", {"code": Pattern(re.compile(rf"!{_RUNNING}"), "!@x_running")}),
+        Hole("during"),
+        _UNKNOWN,
+    ),
+)
+"""Halts an action that runs where a condition is no longer true."""
+
+
+def _actions(*first: Shape, committed: bool) -> tuple[tuple[Shape, str | None], ...]:
     """The forms of actions, with the entry that they keep their status in. Where the tree is ``committed`` to
     actions, they tell when they run."""
 
@@ -396,8 +403,9 @@ def _actions(*, committed: bool) -> tuple[tuple[Shape, str | None], ...]:
     started = Pattern(
         re.compile(f"{begins.pattern.pattern}; _started := 'yes'"), f"{begins.example}; _started := 'yes'"
     )
-    latched = _running(begins, Hole("leaf", ends(_ENTRY, "_latch", ("success", "failure", "success"))))
-    again = _running(started, Hole("leaf", ends("_started", "_started", ("no", "no", "no"))))
+    ended = ends(_ENTRY, "_latch", ("success", "failure", "success"))
+    latched = _running(begins, Hole("leaf", ended), *first)
+    again = _running(started, Hole("leaf", ends("_started", "_started", ("no", "no", "no"))), *first)
     ready: dict[str, Value] = {"variable": "{_started}", "case_1": "yes", "case_2": "never"}
     return (
         (Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, latched)), "_latch"),
@@ -419,7 +427,10 @@ def _actions(*, committed: bool) -> tuple[tuple[Shape, str | None], ...]:
     )
 
 
-_ACTIONS = tuple(zip(_actions(committed=True), _actions(committed=False), strict=True))
+_ACTIONS = (
+    *((form,) for form in _actions(_GOES_ON, committed=True)),
+    *zip(_actions(committed=True), _actions(committed=False), strict=True),
+)
 
 KNOWN = Shape(SKIPPER, {}, (Shape("ForceSuccess", {}, (Hole("leaf"),)), _FAILURE))
 UNKNOWN = Shape(SKIPPER, {}, (Shape("ForceFailure", {}, (Hole("leaf"),)), _SUCCESS))
@@ -463,7 +474,16 @@ def _tags(shape: Shape) -> Iterator[str]:
 
 
 READ = frozenset(
-    ("ReactiveSequence", "ReactiveFallback", "Parallel", "SubTree", "Inverter", "ScriptCondition", LATCH)
+    (
+        "ReactiveSequence",
+        "ReactiveFallback",
+        "Parallel",
+        "SubTree",
+        "Inverter",
+        "ScriptCondition",
+        LATCH,
+        WHILE,
+    )
 ).union(
     *(
         _tags(shape)
@@ -505,6 +525,7 @@ class ActionParts:
     notes: tuple[XmlElement, ...] = ()
     sets: str = ""
     waits: bool = False
+    during: XmlElement | None = None
 
 
 def action_of(element: XmlElement) -> ActionParts | None:
@@ -525,7 +546,8 @@ def action_of(element: XmlElement) -> ActionParts | None:
         parts = _parts(
             leaf, needed, found, latched=keeps == "_latch", flag=found.texts.get("flag", ""), entry=entry
         )
-        return replace(parts, notes=notes, waits=waits)
+        during = found.part("during") if "during" in found.parts else None
+        return replace(parts, notes=notes, waits=waits, during=during)
     return None
 
 
@@ -545,8 +567,12 @@ def _latch(element: XmlElement) -> ActionParts:
             if not fits:
                 found.wrong.append((element, name, example))
     *needed, leaf = element.children
+    during = None
+    if needed and has(needed[-1], WHILE, 1):
+        found.read.append((needed[-1], ()))
+        during = needed.pop().children[0]
     parts = _parts(leaf, needed, found, latched=keep is not False, flag=flag, entry=entry)
-    return replace(parts, sets=element.attributes.get("sets", ""), waits=True)
+    return replace(parts, sets=element.attributes.get("sets", ""), waits=True, during=during)
 
 
 def _committing(

@@ -24,17 +24,16 @@ from bbtc.backends.btcpp.idioms import (
     forgotten,
     full_again,
     is_retry_label,
-    milliseconds,
 )
 from bbtc.backends.btcpp.names import is_numeric, shown, without_number
-from bbtc.backends.btcpp.notes import CLAIM, TEMPLATE
+from bbtc.backends.btcpp.notes import CLAIM, DIGITS, TEMPLATE
 from bbtc.backends.btcpp.reader.conditions import ConditionReader
 from bbtc.backends.btcpp.reader.holding import Holds
 from bbtc.backends.btcpp.reader.layout import Layout, is_port
 from bbtc.backends.btcpp.reader.leaves import Leaves
+from bbtc.backends.btcpp.reader.limits import GIVEN_UP, check_limit
 from bbtc.backends.btcpp.reader.notes import Notes, read_notes, with_notes
 from bbtc.backends.btcpp.reader.patterns import (
-    GIVEN_UP,
     NOT_COMMITTED,
     READ,
     REGISTER,
@@ -54,7 +53,7 @@ from bbtc.backends.btcpp.reader.patterns import (
 from bbtc.backends.btcpp.reader.unbound import put_back
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlElement, parse_xml
-from bbtc.backends.interface import guard_of
+from bbtc.backends.interface import during_of, guard_of
 from bbtc.backends.shape import words_of, written
 from bbtc.diagnostics import BbtcError, Diagnostic, Report, Unreadable
 from bbtc.ground.condition import TRUE, And, Condition, Or
@@ -68,7 +67,7 @@ from bbtc.tree.validate import MAX_DEPTH, tree_problems
 _MOST_FAULTS = 50
 _MOST_READ = 30  # elements of a file for each node that a tree may have
 _REASON = "for "
-_TOLD = re.compile(rf"{re.escape(CLAIM)}([0-9]{{1,300}}(?:/0*[1-9][0-9]{{0,299}})?)(?![0-9/])")
+_TOLD = re.compile(rf"{re.escape(CLAIM)}([0-9]{{1,{DIGITS}}}(?:/0*[1-9][0-9]{{0,{DIGITS - 1}}})?)(?![0-9/])")
 
 _HINTS = {
     "Sequence": "it has memory; a tree reads its conditions in every tick: use ReactiveSequence",
@@ -532,9 +531,11 @@ class _Reader:
         else:
             message, hint = self._no_counterpart(leaf)
             raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
-        self._check_limit(leaf, None if limited is None else limited.texts["msec"], name)
+        found = None if limited is None else limited.texts["msec"]
+        check_limit(self._document, leaf, found, self._task.action_by_name[name])
         self._check_entries(element, parts, name, inside)
         guarded = yield self._guarded(parts, name, inside)
+        yield self._goes_on(element, parts, name, inside)
         held = [fact for note in parts.notes for fact in self._conditions.note(note, inside)]
         held += self._holds.listed(element, parts.sets, inside.ports)
         self._holds.action(element, frozenset(held), parts.waits)
@@ -550,20 +551,6 @@ class _Reader:
             label = without_number(label)
         own = label if label and label != shown(auto) else None
         return ActionNode("", name, parts.latched, bool(guarded), own)
-
-    def _check_limit(self, leaf: XmlElement, found: str | None, name: str) -> None:
-        """An action is given up when the task says so, which its figures rest on."""
-        seconds = self._task.action_by_name[name].timeout
-        wanted = None if seconds is None else str(milliseconds(seconds))
-        if found == wanted:
-            return
-        if wanted is None:
-            message = f"'{clip(name)}' is given up after {found} ms, and has no time-out in the task"
-            hint = "say so in the domain: `:timeout`, in seconds"
-        else:
-            message = f"'{clip(name)}' has to be given up after {wanted} ms"
-            hint = f'<ForceSuccess><Timeout msec="{wanted}">…</Timeout></ForceSuccess> does so'
-        raise unreadable(self._document, leaf, "BBT0616", message, hint=hint)
 
     def _check_entries(self, element: XmlElement, parts: ActionParts, name: str, inside: Scope) -> None:
         """The entries of the blackboard through which an action speaks with the rest of the tree."""
@@ -597,6 +584,20 @@ class _Reader:
                 message = f"another action of this BehaviorTree keeps its state in '{parts.entry}', too"
                 hint = "put each into a BehaviorTree of its own, and call it by a SubTree"
                 raise unreadable(self._document, element, "BBT0616", message, hint=hint)
+
+    def _goes_on(self, element: XmlElement, parts: ActionParts, name: str, scope: Scope) -> Deep[None]:
+        """The action goes on while its condition says so, and no other."""
+        during = during_of(self._task, ActionNode("", name))
+        if during is None and parts.during is None:
+            return
+        if parts.during is not None:
+            live = set(self._holds.live)
+            read: Condition = yield self._conditions.read(parts.during, scope)
+            self._holds.live = live  # it is read as it is, in any case
+            if during is not None and written(self._task, read) == written(self._task, during):
+                return
+        message = f"'{clip(name)}' must go on while its condition in the task is true, and else be halted"
+        raise unreadable(self._document, parts.during or element, "BBT0616", message)
 
     def _guarded(self, parts: ActionParts, name: str, scope: Scope) -> Deep[bool]:
         """Whether the precondition is read before the action starts; nothing else may be."""

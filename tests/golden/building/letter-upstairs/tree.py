@@ -128,6 +128,11 @@ class View:
         return ask
 
 
+def live(robot: R) -> R:
+    """The robot itself, of which nothing is held."""
+    return cast("R", robot.robot) if isinstance(robot, View) else robot
+
+
 def view(robot: R) -> R:
     """The robot as the tree sees it."""
     return cast("R", View(robot))
@@ -172,7 +177,8 @@ class Latch(Decorator):
     until the next tick, because conditions to the left were read before the action's effect. An
     action interrupted after its start counts as run. A guard must be True for it to start; with
     ``keep=False`` it starts again whenever it is ticked. While it runs, the tree reads what is
-    its ``own``, which the action may itself set, as it was in the tick that started it."""
+    its ``own``, which the action may itself set, as it was in the tick that started it; where
+    ``during`` is not True, it is cancelled."""
 
     def __init__(
         self,
@@ -183,11 +189,13 @@ class Latch(Decorator):
         keep: bool = True,
         *,
         own: Iterable[Fact] = (),
+        during: Callable[[], bool | None] | None = None,
     ) -> None:
         super().__init__(name=name, child=Action(name, act, cancel))
         self._guard = guard
         self._keep = keep
         self._own = own
+        self._during = during
         self._started = False
         self._final: Status | None = None
 
@@ -208,10 +216,14 @@ class Latch(Decorator):
                 self._use_up()
             if root is not None:
                 root.acts(self, () if self._started else self._own)
-            self._started = True
-            yield from self.decorated.tick()
-            if self.decorated.status != Status.RUNNING:
-                self._end(self.decorated.status)
+            if self._started and self._during is not None and not self._during():
+                self.decorated.stop(Status.INVALID)
+                self._end(Status.SUCCESS)
+            else:
+                self._started = True
+                yield from self.decorated.tick()
+                if self.decorated.status != Status.RUNNING:
+                    self._end(self.decorated.status)
         if ready or ready is None:
             self.status = Status.RUNNING
         else:
@@ -448,6 +460,7 @@ def create_root(robot: Robot) -> Behaviour:
                             negated(robot.crowded("office")),
                         ),
                         keep=False,
+                        during=lambda: negated(live(robot).crowded("office")),
                         own=OWN["drive(upstairs,office)"],
                     ),
                     Latch(
@@ -503,6 +516,7 @@ def create_root(robot: Robot) -> Behaviour:
                         robot.open("glass-door"),
                     ),
                     keep=False,
+                    during=lambda: live(robot).open("glass-door"),
                     own=OWN["pass(glass-door,lobby,downstairs)"],
                 ),
             ),
@@ -532,6 +546,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.crowded("lobby")),
                 ),
                 keep=False,
+                during=lambda: negated(live(robot).crowded("lobby")),
                 own=OWN["drive(charger,lobby)"],
             ),
             sequence(
@@ -547,6 +562,7 @@ def create_root(robot: Robot) -> Behaviour:
                         robot.open("glass-door"),
                     ),
                     keep=False,
+                    during=lambda: live(robot).open("glass-door"),
                     own=OWN["pass(glass-door,downstairs,lobby)"],
                 ),
             ),
@@ -587,6 +603,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.crowded("charger")),
                 ),
                 keep=False,
+                during=lambda: negated(live(robot).crowded("charger")),
                 own=OWN["drive(lobby,charger)"],
             ),
             Latch(
@@ -599,6 +616,7 @@ def create_root(robot: Robot) -> Behaviour:
                     negated(robot.crowded("upstairs")),
                 ),
                 keep=False,
+                during=lambda: negated(live(robot).crowded("upstairs")),
                 own=OWN["drive(office,upstairs)"],
             ),
             Latch(

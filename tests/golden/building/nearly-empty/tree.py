@@ -117,6 +117,11 @@ class View:
         return ask
 
 
+def live(robot: R) -> R:
+    """The robot itself, of which nothing is held."""
+    return cast("R", robot.robot) if isinstance(robot, View) else robot
+
+
 def view(robot: R) -> R:
     """The robot as the tree sees it."""
     return cast("R", View(robot))
@@ -161,7 +166,8 @@ class Latch(Decorator):
     until the next tick, because conditions to the left were read before the action's effect. An
     action interrupted after its start counts as run. A guard must be True for it to start; with
     ``keep=False`` it starts again whenever it is ticked. While it runs, the tree reads what is
-    its ``own``, which the action may itself set, as it was in the tick that started it."""
+    its ``own``, which the action may itself set, as it was in the tick that started it; where
+    ``during`` is not True, it is cancelled."""
 
     def __init__(
         self,
@@ -172,11 +178,13 @@ class Latch(Decorator):
         keep: bool = True,
         *,
         own: Iterable[Fact] = (),
+        during: Callable[[], bool | None] | None = None,
     ) -> None:
         super().__init__(name=name, child=Action(name, act, cancel))
         self._guard = guard
         self._keep = keep
         self._own = own
+        self._during = during
         self._started = False
         self._final: Status | None = None
 
@@ -197,10 +205,14 @@ class Latch(Decorator):
                 self._use_up()
             if root is not None:
                 root.acts(self, () if self._started else self._own)
-            self._started = True
-            yield from self.decorated.tick()
-            if self.decorated.status != Status.RUNNING:
-                self._end(self.decorated.status)
+            if self._started and self._during is not None and not self._during():
+                self.decorated.stop(Status.INVALID)
+                self._end(Status.SUCCESS)
+            else:
+                self._started = True
+                yield from self.decorated.tick()
+                if self.decorated.status != Status.RUNNING:
+                    self._end(self.decorated.status)
         if ready or ready is None:
             self.status = Status.RUNNING
         else:
@@ -466,6 +478,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.crowded("office")),
                     ),
                     keep=False,
+                    during=lambda: negated(live(robot).crowded("office")),
                     own=OWN["drive(lobby,office)"],
                 ),
             ),
@@ -482,6 +495,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.crowded("lobby")),
                     ),
                     keep=False,
+                    during=lambda: negated(live(robot).crowded("lobby")),
                     own=OWN["drive(charger,lobby)"],
                 ),
             ),
@@ -512,6 +526,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.crowded("charger")),
                     ),
                     keep=False,
+                    during=lambda: negated(live(robot).crowded("charger")),
                     own=OWN["drive(lobby,charger)"],
                 ),
             ),
@@ -543,6 +558,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.crowded("charger")),
                     ),
                     keep=False,
+                    during=lambda: negated(live(robot).crowded("charger")),
                     own=OWN["drive(lobby,charger)"],
                 ),
             ),
@@ -559,6 +575,7 @@ def create_root(robot: Robot) -> Behaviour:
                         negated(robot.crowded("lobby")),
                     ),
                     keep=False,
+                    during=lambda: negated(live(robot).crowded("lobby")),
                     own=OWN["drive(office,lobby)"],
                 ),
             ),
