@@ -26,8 +26,9 @@ from bbtc.backends.btcpp.bindings.read import files_of, read_bindings
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.palette import btcpp_palette
-from bbtc.diagnostics import BbtcError
+from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.replay.engines import BtcppReplay
+from bbtc.replay.script import TIMINGS
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import Tree
 from tests.builder.projects import bbtc as command
@@ -270,9 +271,11 @@ def same_runs(folder: Path, tree: Tree, seed: int) -> int:
         return 0
     document = bound(folder, tree, all_bound(tree))
     assert not {each.tag for each in document.iter() if each.tag in set(btcpp_names(tree).ids.values())}
-    replay = BtcppReplay(tree, unbound(document, btcpp_names(tree)))
+    replay, plain = BtcppReplay(tree, unbound(document, btcpp_names(tree))), BtcppReplay(tree)
     for script, expected in runs:
         assert replay.run(script) == expected
+        for timing in TIMINGS:  # what a running action sets is held, of nodes of others, too
+            assert replay.run(script, timing) == plain.run(script, timing)
     return len(runs)
 
 
@@ -531,6 +534,45 @@ def test_a_near_name_is_offered(tmp_path: Path) -> None:
         with pytest.raises(BbtcError) as raised:
             bound(tmp_path, patrol(), BINDINGS.replace(old, new, 1))
         assert any(hint in (each.hint or "") for each in raised.value.diagnostics)
+
+
+ODD = [
+    "{}",
+    "[]",
+    "null",
+    "1e400",
+    "{of:to}",
+    "{of:1}",
+    "&a",
+    "*a",
+    "-",
+    ":",
+    "#",
+    "é",
+    "\x07",
+    "node:A",
+    "ros:{}",
+    "{a:{b:c}}",
+    "!!int",
+    "0x1F",
+    ".nan",
+    "<<:",
+]
+
+
+def test_broken_texts_are_told_and_nothing_else_happens(tmp_path: Path) -> None:
+    tree, rng, told = patrol(), random.Random(3), list[Diagnostic]()
+    for _ in range(amount(150, 20_000)):
+        text = BINDINGS
+        for _ in range(rng.randint(1, 3)):
+            start = rng.randrange(len(text))
+            text = text[:start] + rng.choice(ODD) + text[start + rng.randint(0, 12) :]
+        try:
+            bound(tmp_path, tree, text)
+        except BbtcError as error:
+            told += error.diagnostics
+    assert told
+    assert all(each.span is not None for each in told)
 
 
 @pytest.mark.parametrize(
