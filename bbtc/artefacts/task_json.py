@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from bbtc.artefacts import duration_json, numbers_json
-from bbtc.artefacts.bodies_json import body_to_json
+from bbtc.artefacts.bodies_json import at_node, body_to_json, children_at, kind_at
 from bbtc.artefacts.conditions import condition_to_json, number_of
 from bbtc.artefacts.cursor import At, Faults, check_distinct, clip, optional, run_reader
 from bbtc.artefacts.hidden_json import (
@@ -22,10 +22,9 @@ from bbtc.artefacts.hidden_json import (
     true_world,
     true_world_to_json,
 )
-from bbtc.artefacts.jsontext import Path
 from bbtc.artefacts.numbers import given_text
 from bbtc.artefacts.prior_json import check_sum
-from bbtc.diagnostics import BbtcError, Diagnostic
+from bbtc.diagnostics import BbtcError
 from bbtc.ground.condition import TRUE, Condition
 from bbtc.ground.describe import values_in_words
 from bbtc.ground.events import clashes
@@ -54,7 +53,7 @@ from bbtc.ground.task import (
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.source import SourceFile
-from bbtc.tree.validate import MAX_DEPTH, active_templates, body_problems
+from bbtc.tree.validate import active_templates, body_problems
 
 FORMAT = "bbtc-task"
 VERSION = 1
@@ -574,25 +573,3 @@ def _check_templates(members: Mapping[str, At], task: Task, faults: Faults) -> N
         parts = dict(element.entries())
         for problem in body_problems(task, task.template_by_name[parts["name"].string()], active):
             faults.add(at_node(problem, parts["body"].path))
-
-
-def at_node(problem: Diagnostic, root: Path) -> Diagnostic:
-    """A broken rule of a tree or body with the path to its node in JSON."""
-    steps = (step for number in problem.path for step in ("children", number))
-    return replace(problem, path=(*root, *steps))
-
-
-def kind_at(at: At, *kinds: str) -> str:
-    """The type of a node."""
-    for name, value in at.entries():
-        if name == "type":
-            return value.word(*kinds)
-    raise at.fault("BBT0603", "field 'type' is missing")
-
-
-def children_at(at: At, level: int) -> list[At]:
-    """The children of a control node that stands at a level, the root's being 1."""
-    children = at.elements()
-    if level >= MAX_DEPTH and children:
-        raise at.fault("BBT0605", f"a tree has at most {MAX_DEPTH} levels")
-    return children

@@ -13,15 +13,13 @@ from typing import get_args
 
 from typing_extensions import assert_never
 
+from bbtc.artefacts.bodies_json import at_node, children_at, kind_at
 from bbtc.artefacts.conditions import condition_from_json, condition_to_json
 from bbtc.artefacts.cursor import At, Faults, run_reader
 from bbtc.artefacts.numbers import figure_text, given_text
 from bbtc.artefacts.task_json import (
     Json,
-    at_node,
     check_header,
-    children_at,
-    kind_at,
     read_task,
     task_to_json,
 )

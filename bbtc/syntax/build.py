@@ -38,6 +38,7 @@ from bbtc.syntax.fields import (
     Field,
     Fields,
     Implied,
+    NumberRange,
     Observe,
     OnAbort,
     OnTimeout,
@@ -47,6 +48,7 @@ from bbtc.syntax.fields import (
     Sensed,
     Timeout,
     TimeoutProbability,
+    Types,
     Uninterruptible,
     observed,
     timing_of,
@@ -66,20 +68,6 @@ _CONTROLS = {"SEQUENCE": "sequence", "FALLBACK": "fallback", "SKIPPER": "skipper
 
 
 _HOW_LONG = "write `(= ?duration n)`; or use an `:action`, with `:duration (uniform a b)` for one that varies"
-
-
-class Types(NamedTuple):
-    """``- type`` or ``- (either type…)`` behind names."""
-
-    names: tuple[ast.Name, ...]
-    span: Span
-
-
-class NumberRange(NamedTuple):
-    """``- (int low high)`` behind a function, with what it spans."""
-
-    range: ast.NumberRange
-    span: Span
 
 
 class DerivedHead(NamedTuple):

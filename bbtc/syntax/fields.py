@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from bbtc.source import Span
 from bbtc.syntax import ast
@@ -14,6 +14,20 @@ from bbtc.syntax.expressions import parameters_of
 from bbtc.syntax.leaves import Misuse
 
 _V_co = TypeVar("_V_co", covariant=True)
+
+
+class Types(NamedTuple):
+    """``- type`` or ``- (either type…)`` behind names."""
+
+    names: tuple[ast.Name, ...]
+    span: Span
+
+
+class NumberRange(NamedTuple):
+    """``- (int low high)`` behind a function, with what it spans."""
+
+    range: ast.NumberRange
+    span: Span
 
 
 @dataclass(frozen=True, slots=True)

@@ -123,7 +123,7 @@ def test_the_palette_has_the_leaves_and_control_nodes_alone(golden: Golden) -> N
     (model,) = ET.fromstring(text)
     assert [entry.tag for entry in model] == ["Condition"] * 2 + ["Action"] * 2 + ["Control"] * 2 + [
         "Decorator"
-    ] * 2
+    ] * 3
     assert [entry.tag for entry in ET.fromstring(palette(soda_tree()))[0]] == ["Condition"] * 2 + [
         "Action"
     ] * 2

@@ -50,6 +50,7 @@ def idioms_task() -> Task:
                 ("can",),
                 And((Is(near, Truth.TRUE), Or((Is(seen, Truth.UNKNOWN), Is(shelf, Truth.TRUE))))),
                 (chance((seen, Truth.TRUE), (seen, Truth.FALSE)),),
+                during=Is(near, Truth.TRUE),
             ),
             GroundAction("look", ("cup",), TRUE, (chance((shelf, Truth.TRUE), (shelf, Truth.FALSE)),)),
             GroundAction("switch-on", (), TRUE, (chance((lit, Truth.TRUE), (lit, Truth.TRUE)),)),

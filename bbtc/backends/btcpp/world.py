@@ -111,12 +111,23 @@ class SimulatedRobotWriter:
                 "  static const Model all = {",
                 f"      /*facts=*/{_rows(facts)},",
                 f"      /*initial=*/{_rows(initial)},",
-                f"      /*actions=*/{_rows(actions)}}};",
+                f"      /*actions=*/{_rows(actions)}{self._numbers()}}};",
                 "  return all;",
                 "}",
                 "",
             ]
         )
+
+    def _numbers(self) -> str:
+        """The numbers that the facts are the digits of."""
+        rows = []
+        for number in self._task.numbers:
+            if self._number.keys() >= set(number.digits):
+                symbol = variable_symbol(self._task.variables[number.digits[0]])
+                name = cppcode.literal(key_of(self._names, symbol, number.args))
+                digits = braces(str(self._number[digit]) for digit in number.digits)
+                rows.append(f"{{{name}, {{{number.low}, {digits}}}}}")
+        return f",\n      /*numbers=*/{_rows(rows)}" if rows else ""
 
     def _moves(self) -> str:
         """What happens by itself, and which actions that may end."""
@@ -272,21 +283,6 @@ class SimulatedRobotWriter:
         values = ",".join(self._names.values[arg] for arg in variable.args)
         return f"{variable.predicate}({values})"
 
-    def _number_code(self, leaf: Leaf, arguments: list[str]) -> str:
-        """C++ that puts a number together of its digits."""
-        number = next(
-            each
-            for each in self._task.numbers
-            if (each.function, len(each.args)) == (leaf.symbol.name, leaf.symbol.arity)
-        )
-        parts = [str(number.low)]
-        for place, digit in enumerate(number.digits):
-            inner = ' + "," + '.join(arguments)
-            head = cppcode.literal(f"{self._task.variables[digit].predicate}({'' if arguments else ')'}")
-            key = f'std::string({head}) + {inner} + ")"' if arguments else head
-            parts.append(f"(world_.read({key}).value() ? {1 << place} : 0)")
-        return " + ".join(parts)
-
     # --- the robot ---------------------------------------------------------------------------
 
     def _method(self, leaf: Leaf) -> str:
@@ -297,7 +293,7 @@ class SimulatedRobotWriter:
             value = f"world_.read({key})" if leaf.three_valued else f"world_.read({key}).value()"
             return f"\n  {declared} override {{ return {value}; }}"
         if leaf.counts:
-            return f"\n  {declared} override {{ return {self._number_code(leaf, list(names))}; }}"
+            return f"\n  {declared} override {{ return world_.number({key}); }}"
         cancel = self._leaves.declaration(leaf, self._leaves.cancel(leaf))
         return (
             f"\n  {declared} override {{ return world_.act({key}); }}"

@@ -123,7 +123,8 @@ class Latch(Decorator):
     until the next tick, because conditions to the left were read before the action's effect. An
     action interrupted after its start counts as run. A guard must be True for it to start; with
     ``keep=False`` it starts again whenever it is ticked. While it runs, the tree reads what is
-    its ``own``, which the action may itself set, as it was in the tick that started it."""
+    its ``own``, which the action may itself set, as it was in the tick that started it; where
+    ``during`` is not True, it is cancelled."""
 
     def __init__(
         self,
@@ -134,11 +135,13 @@ class Latch(Decorator):
         keep: bool = True,
         *,
         own: Iterable[Fact] = (),
+        during: Callable[[], bool | None] | None = None,
     ) -> None:
         super().__init__(name=name, child=Action(name, act, cancel))
         self._guard = guard
         self._keep = keep
         self._own = own
+        self._during = during
         self._started = False
         self._final: Status | None = None
 
@@ -159,10 +162,14 @@ class Latch(Decorator):
                 self._use_up()
             if root is not None:
                 root.acts(self, () if self._started else self._own)
-            self._started = True
-            yield from self.decorated.tick()
-            if self.decorated.status != Status.RUNNING:
-                self._end(self.decorated.status)
+            if self._started and self._during is not None and not self._during():
+                self.decorated.stop(Status.INVALID)
+                self._end(Status.SUCCESS)
+            else:
+                self._started = True
+                yield from self.decorated.tick()
+                if self.decorated.status != Status.RUNNING:
+                    self._end(self.decorated.status)
         if ready or ready is None:
             self.status = Status.RUNNING
         else:

@@ -54,12 +54,19 @@ struct Factor {
   std::vector<Outcome> outcomes;
 };
 
+/// A whole number, kept as facts: its binary digits, the least first, which count from `low`.
+struct Number {
+  int low;
+  std::vector<std::size_t> digits;
+};
+
 /// The facts, the states a run may start in, with their weights, and what each action does: one outcome of
 /// every factor, independently.
 struct Model {
   std::vector<std::string> facts;
   std::vector<std::pair<std::uint64_t, State>> initial;
   std::map<std::string, std::vector<Factor>> actions;
+  std::map<std::string, Number> numbers = {};
 };
 
 /// The state of a run. Actions take some ticks; their outcome applies in the last one.
@@ -83,6 +90,16 @@ class SimulatedWorld {
   std::optional<bool> read(const std::string& fact) const {
     const Truth value = state_.at(numbers_.at(fact));
     return value == Truth::Unknown ? std::nullopt : std::optional<bool>(value == Truth::True);
+  }
+
+  /// The value of a number.
+  int number(const std::string& name) const {
+    const Number& number = model_.numbers.at(name);
+    int value = number.low;
+    for (std::size_t place = 0; place < number.digits.size(); ++place) {
+      value += state_[number.digits[place]] == Truth::True ? 1 << place : 0;
+    }
+    return value;
   }
 
   /// Start or continue an action.
@@ -144,7 +161,17 @@ class SimulatedWorld {
       return;
     }
     *report_ << action << ':';
-    for (const auto& [fact, value] : changes) {
+    auto facts = changes;
+    for (const auto& [name, number] : model_.numbers) {
+      bool changed = false;
+      for (const auto digit : number.digits) {
+        changed = facts.erase(digit) > 0 || changed;
+      }
+      if (changed) {
+        *report_ << ' ' << name << " = " << this->number(name);
+      }
+    }
+    for (const auto& [fact, value] : facts) {
       *report_ << ' ' << model_.facts[fact]
                << (value == Truth::True ? " true" : value == Truth::False ? " false" : " unknown");
     }

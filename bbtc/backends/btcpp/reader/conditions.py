@@ -9,18 +9,8 @@ from typing import Generic, Protocol, TypeVar
 from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.reader.holding import Holds
 from bbtc.backends.btcpp.reader.leaves import Leaves
-from bbtc.backends.btcpp.reader.patterns import (
-    HELD_LEAF,
-    KNOWN,
-    NOTE,
-    REGISTER,
-    UNKNOWN,
-    Match,
-    has,
-    match,
-    match_one,
-    tag_of,
-)
+from bbtc.backends.btcpp.reader.patterns import HELD_LEAF, KNOWN, NOTE, REGISTER, UNKNOWN
+from bbtc.backends.btcpp.reader.shapes import Match, has, match, match_one, tag_of
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.backends.commitment import Fact

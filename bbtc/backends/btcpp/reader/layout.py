@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from bbtc.artefacts.cursor import clip
-from bbtc.backends.btcpp.reader.patterns import has
+from bbtc.backends.btcpp.reader.shapes import has
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.diagnostics import BbtcError, Diagnostic

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from bbtc.artefacts.cursor import clip, nearest
 from bbtc.backends.btcpp.names import objects_of
 from bbtc.backends.btcpp.reader.layout import is_port
-from bbtc.backends.btcpp.reader.patterns import tag_of
+from bbtc.backends.btcpp.reader.shapes import tag_of
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.backends.interface import BOUNDS, action_symbol, parameters_of, variable_symbol

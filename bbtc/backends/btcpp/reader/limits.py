@@ -6,7 +6,7 @@ import re
 
 from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.idioms import TIMEOUT, milliseconds
-from bbtc.backends.btcpp.reader.patterns import Hole, Pattern, Shape
+from bbtc.backends.btcpp.reader.shapes import Hole, Pattern, Shape
 from bbtc.backends.btcpp.reader.unread import unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.ground.task import GroundAction

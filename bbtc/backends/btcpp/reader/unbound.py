@@ -12,7 +12,7 @@ from bbtc.backends.btcpp.bindings.entries import Argument, Binding, Bindings, En
 from bbtc.backends.btcpp.names import objects_of
 from bbtc.backends.btcpp.reader.layout import is_port
 from bbtc.backends.btcpp.reader.leaves import FileNames
-from bbtc.backends.btcpp.reader.patterns import tag_of
+from bbtc.backends.btcpp.reader.shapes import tag_of
 from bbtc.backends.btcpp.reader.unread import unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.backends.interface import action_symbol, parameters_of, variable_symbol

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 from bbtc.artefacts.cursor import clip
-from bbtc.backends.btcpp.reader.patterns import Match, is_long, tag_of
+from bbtc.backends.btcpp.reader.shapes import Match, is_long, tag_of
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.diagnostics import Diagnostic, Unreadable
 

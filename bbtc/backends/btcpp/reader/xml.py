@@ -8,8 +8,8 @@ its place. What a tree cannot hold is reported with its place. The inverse of
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import islice
 
@@ -41,15 +41,10 @@ from bbtc.backends.btcpp.reader.patterns import (
     TRIED,
     UNTIL_BLOCKED,
     ActionParts,
-    Match,
     action_of,
-    boolean_of,
-    has,
-    is_skipper,
-    match,
-    match_one,
-    tag_of,
 )
+from bbtc.backends.btcpp.reader.scope import Scope
+from bbtc.backends.btcpp.reader.shapes import Match, boolean_of, has, is_skipper, match, match_one, tag_of
 from bbtc.backends.btcpp.reader.unbound import put_back
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
 from bbtc.backends.btcpp.xmltext import XmlElement, parse_xml
@@ -87,23 +82,6 @@ class Imported:
     tree: Tree
     claimed: Fraction | None
     told: Fraction | None
-
-
-@dataclass(frozen=True, slots=True)
-class Scope:
-    """Where in the file the reader is: the values of the ports there, the BehaviorTrees around, the retry
-    nodes around, each with its counter, and the retry-until-success nodes around, each with the scripts that
-    make what was read below it forget."""
-
-    ports: Mapping[str, str] = field(default_factory=dict)
-    trees: tuple[str, ...] = ()
-    counters: tuple[str, ...] = ()
-    level: int = 1
-    forget: tuple[list[str], ...] = ()
-
-    def down(self) -> Scope:
-        """One level of the tree further down."""
-        return replace(self, level=self.level + 1)
 
 
 def tree_from_btcpp(
