@@ -36,6 +36,8 @@ MARGIN = Fraction(5, 1000)
 """By so much a planned tree may succeed less often than the one by hand."""
 MOST_NODES = Fraction(3, 2)
 """So many times the nodes may a planned tree have."""
+MORE_NODES = {Problem("bin-picking", "two-parts"): Fraction(5, 2)}
+"""Where it has more than that: it ends where the goal is out of reach, and the one by hand is blocked."""
 
 _BY_HAND = Path(__file__).parent / "by_hand"
 
@@ -99,5 +101,6 @@ def shortfalls(problem: Problem, count: int, seed: int) -> Iterator[tuple[Kind, 
     if theirs_cost is not None and (ours_cost is None or ours_cost > theirs_cost):
         yield "cost", f"it costs {ours_cost and float(ours_cost)}, not {float(theirs_cost)}"
     ours_nodes, theirs_nodes = (nodes_of(problem, author) for author in ("planned", "by hand"))
-    if ours_nodes > MOST_NODES * theirs_nodes:
-        yield "nodes", f"it has {ours_nodes} nodes, more than {float(MOST_NODES)} times {theirs_nodes}"
+    most = MORE_NODES.get(problem, MOST_NODES)
+    if ours_nodes > most * theirs_nodes:
+        yield "nodes", f"it has {ours_nodes} nodes, more than {float(most)} times {theirs_nodes}"

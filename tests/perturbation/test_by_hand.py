@@ -20,8 +20,12 @@ SEED = 11
 
 OUT_OF_REACH = {Problem("kitting", "gift-set"), Problem("warehouse", "one-order")}
 """Where an item may be lost for good, or a pallet shuts the robot in: no tree that ends attains 99 %."""
-ALMOST = {Problem("service-robot", "two-goals"): Fraction(97, 100)}
-"""Where the book is nowhere in 1 of 64 undisturbed runs; too many states to find the optimum."""
+ALMOST = {
+    Problem("service-robot", "two-goals"): Fraction(97, 100),
+    Problem("building", "letter-upstairs"): Fraction(90, 100),
+}
+"""Where the book is nowhere in 1 of 64 undisturbed runs, with too many states to find the optimum; and where
+the battery may be emptied far from the charger."""
 
 
 def test_there_is_a_tree_by_hand_for_each_domain() -> None:
