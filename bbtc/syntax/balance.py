@@ -26,6 +26,7 @@ _SECTIONS = frozenset(
     (
         *(":requirements", ":types", ":constants", ":predicates", ":functions"),
         *(":action", ":derived", ":axiom", ":sensor", ":template", ":durative-action", ":constraints"),
+        ":exogenous",
         *(":variable", ":obs-variable", ":default-sensing-model", ":observable", ":sticky"),
         *(":observables", ":observations", ":observation", ":init-belief"),
         *(":domain", ":objects", ":init", ":hidden", ":goal", ":goal-probability", ":goal-reward", ":metric"),
@@ -34,16 +35,13 @@ _SECTIONS = frozenset(
 _FIELDS = {
     ":action": frozenset(
         (
-            ":parameters",
-            ":precondition",
-            ":observe",
-            ":sensing-model",
-            ":observation",
-            ":repeats",
-            ":uninterruptible",
-            ":effect",
+            *(":parameters", ":precondition", ":effect", ":repeats", ":uninterruptible"),
+            *(":observe", ":sensing-model", ":observation", ":while", ":on-abort"),
+            *(":duration", ":timeout", ":timeout-probability", ":on-timeout"),
         )
     ),
+    ":durative-action": frozenset((":parameters", ":duration", ":condition", ":effect")),
+    ":exogenous": frozenset((":parameters", ":precondition", ":effect", ":per", ":before")),
     ":observation": frozenset((":parameters", ":condition", ":distribution")),
     ":template": frozenset((":parameters", ":precondition", ":effect", ":body")),
     ":sensor": frozenset((":parameters", ":condition", ":sense", ":sensed", ":repeats")),

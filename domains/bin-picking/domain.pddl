@@ -3,14 +3,11 @@
 (define (domain bin-picking)
   (:requirements :negative-preconditions :probabilistic-effects :numeric-fluents :unknown)
   (:predicates
-    (unknown (free-part))     ; does a part lie so that it can be taken? unknown until the camera has looked
+    (unknown (free-part)) ; does a part lie so that it can be taken? unknown until the camera has looked
     (holding)
     (tray)                    ; is there a tray to put parts in?
     (done))
-  (:functions
-    (in-bin) - (int 0 9)
-    (in-tray) - (int 0 9)
-    (wanted))
+  (:functions (in-bin) - (int 0 9) (in-tray) - (int 0 9) (wanted))
 
   (:exogenous tray-is-taken
     :per second
@@ -30,7 +27,9 @@
   (:action look
     :precondition (and (unknown (free-part)) (> (in-bin) 0))
     :duration 0.4
-    :effect (probabilistic 0.85 (free-part) 0.15 (not (free-part))))
+    :effect (probabilistic
+      0.85 (free-part)
+      0.15 (not (free-part))))
 
   ; A grasp that takes longer than three seconds is given up: the part is wedged.
   (:action grasp

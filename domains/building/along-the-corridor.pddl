@@ -1,7 +1,9 @@
 ; On one floor: a door that people use, and a corridor that they crowd.
 (define (problem along-the-corridor)
   (:domain building)
-  (:objects charger corridor office - place swing-door - door)
+  (:objects
+    charger corridor office - place
+    swing-door - door)
   (:init
     (at charger)
     (doorway swing-door charger corridor) (doorway swing-door corridor charger)

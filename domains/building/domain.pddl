@@ -18,8 +18,7 @@
     (desk ?place - place)                  ; where this one goes
     (loaded)
     (delivered))
-  (:functions
-    (battery) - (int 0 10))
+  (:functions (battery) - (int 0 10))
 
   ; --- what happens by itself, second by second -------------------------------------------------
   (:exogenous somebody-opens
@@ -86,7 +85,9 @@
     :precondition (and (at ?place) (landing ?place) (not (cabin ?place)))
     :duration (triangular 5 20 90)
     :timeout 60
-    :effect (and (cabin ?place) (forall (?other - place) (when (not (= ?other ?place)) (not (cabin ?other))))))
+    :effect (and
+      (cabin ?place)
+      (forall (?other - place) (when (not (= ?other ?place)) (not (cabin ?other))))))
 
   (:action ride
     :parameters (?from ?to - place)

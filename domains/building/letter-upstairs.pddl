@@ -1,7 +1,9 @@
 ; From the dock through the glass door and the lobby, with the lift, to an office upstairs.
 (define (problem letter-upstairs)
   (:domain building)
-  (:objects charger lobby downstairs upstairs office - place glass-door - door)
+  (:objects
+    charger lobby downstairs upstairs office - place
+    glass-door - door)
   (:init
     (at charger)
     (way charger lobby) (way lobby charger)

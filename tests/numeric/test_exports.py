@@ -83,3 +83,13 @@ def test_the_simulated_world_of_py_trees_has_the_figures(courier: bbtc.Tree) -> 
     expected = float(courier.success_probability)
     # Five standard deviations.
     assert abs(wins / runs - expected) < 5 * (expected * (1 - expected) / runs) ** 0.5
+
+
+def test_numbers_of_the_simulated_world_of_py_trees_stay_at_their_bounds() -> None:
+    pytest.importorskip("py_trees", reason="py_trees is not installed")
+    from bbtc.runtime.numbers import Shift
+
+    battery = ("battery",)
+    for before, amount_added, after in [(18, 5, 20), (18, 2, 20), (18, 1, 19), (3, -5, -1), (3, -3, 0)]:
+        shift = Shift(battery, amount_added, -1, 20)
+        assert shift.on({battery: before}).changes == {battery: after}
