@@ -327,6 +327,7 @@ def import_tree(
     *task: Source,
     namespace: str = "",
     tree: str | None = None,
+    bindings: str | os.PathLike[str] = "",
     problem: str | None = None,
     lenient: bool = False,
     limits: Limits | None = None,
@@ -334,8 +335,8 @@ def import_tree(
 ) -> Tree:
     """The tree of an exported file, also of one that was edited, as ``bbtc import`` reads it; ``task`` is its
     domain and problem (``problem`` and ``lenient`` as in :func:`load`), its compiled task, or the tree it was
-    exported from; ``tree`` is the id of the BehaviorTree to read, of a file with several that nobody calls.
-    Where the file claims
+    exported from; ``tree`` is the id of the BehaviorTree to read, of a file with several that nobody calls;
+    ``bindings`` is the file of bindings that it was exported with. Where the file claims
     figures that the tree does not have, a note goes to ``report``. Raises :class:`BbtcError` with
     everything that cannot be read, and :class:`LimitReached`."""
     from bbtc import pipeline
@@ -344,7 +345,14 @@ def import_tree(
     doubts, reading = Report() if report is None else report, Reading(problem, lenient)
     limits = limits or Limits()
     return pipeline.import_tree(
-        source, others, doubts, limits, namespace=namespace, main=tree, reading=reading
+        source,
+        others,
+        doubts,
+        limits,
+        namespace=namespace,
+        main=tree,
+        reading=reading,
+        bindings=os.fspath(bindings),
     )
 
 
@@ -420,7 +428,7 @@ def explain(code: str) -> str:
 
 
 def _read(sources: Sequence[Source], limits: Limits | None) -> list[SourceFile]:
-    from bbtc.syntax.reader import read_source
+    from bbtc.files.sources import read_source
 
     most = (limits or Limits()).file_bytes
     return [s if isinstance(s, SourceFile) else read_source(os.fspath(s), most) for s in sources]

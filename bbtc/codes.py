@@ -198,6 +198,12 @@ _CODES = (
     Code("BBT0705", "tree too deep for the engine"),
     Code("BBT0706", "no program can draw the picture"),
     Code("BBT0707", "module that Python cannot import"),
+    Code("BBT0708", "binding of what the domain or a table does not have"),
+    Code("BBT0709", "models of nodes that cannot be read"),
+    Code("BBT0710", "bound node without model, or of another kind"),
+    Code("BBT0711", "port that a bound node lacks or needs"),
+    Code("BBT0712", "value that a port does not take"),
+    Code("BBT0713", "binding that the export cannot keep"),
     # 08xx: verification
     Code("BBT0801", "tree whose figures are not what it claims"),
     Code("BBT0802", "tree that is not sound"),

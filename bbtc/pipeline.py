@@ -329,17 +329,19 @@ def import_tree(
     namespace: str = "",
     main: str | None = None,
     reading: Reading = AS_WRITTEN,
+    bindings: str = "",
 ) -> Tree:
     """The tree of an exported BehaviorTree.CPP file or of a tree artefact, by hand edited ones too. Its
     task is that of ``others``: a domain and a problem, a compiled task, or another tree; without them
     the one a tree artefact carries. ``main`` names the BehaviorTree to read, of a file with several that
-    nobody calls. The claimed figures are those of the exact simulation; where the file claimed others, or
-    none, a note says so.
+    nobody calls; ``bindings`` the file of bindings that it was exported with. The claimed figures are those
+    of the exact simulation; where the file claimed others, or none, a note says so.
 
     Raises :class:`BbtcError` with everything that cannot be read, or ``LimitReached``.
     """
     from bbtc.artefacts import load_tree
     from bbtc.artefacts.kinds import is_artefact, is_xml
+    from bbtc.backends.btcpp.bindings.read import read_bindings
     from bbtc.backends.btcpp.reader.xml import Imported, tree_from_btcpp
 
     if not is_xml(source) and not is_artefact(source):
@@ -355,7 +357,10 @@ def import_tree(
         hint = "give its domain and problem, its compiled task, or the tree it was exported from"
         raise BbtcError.single("BBT0609", f"{source.name} carries no task", hint=hint)
     else:
-        imported = tree_from_btcpp(source, task, report, limits, namespace=namespace, main=main)
+        bound = read_bindings(bindings) if bindings else None
+        imported = tree_from_btcpp(
+            source, task, report, limits, namespace=namespace, main=main, bindings=bound
+        )
     return _with_figures(imported, source, report, limits)
 
 

@@ -26,10 +26,10 @@ from typing import TypeVar
 
 from bbtc.analysis.resolve import resolve
 from bbtc.diagnostics import BbtcError, Diagnostic, Report
+from bbtc.files.sources import read_source
 from bbtc.syntax.ast import Definition, Document, DomainReference
 from bbtc.syntax.parser import parse
 from bbtc.syntax.printer import print_document
-from bbtc.syntax.reader import read_source
 from tests.conftest import corpus_folder
 
 _T = TypeVar("_T")

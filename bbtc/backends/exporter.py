@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Protocol, TypeAlias, runtime_checkable
@@ -39,12 +39,14 @@ for a directory."""
 @dataclass(frozen=True, slots=True)
 class Option:
     """A declared option of an exporter. The type of ``default`` (bool, int or str) is the type of
-    the option; a str option with ``choices`` takes only those."""
+    the option; a str option with ``choices`` takes only those. Where it names a file (unless it is empty),
+    ``reads`` gives that and all others that are read for it."""
 
     name: str
     default: OptionValue
     help: str
     choices: tuple[str, ...] = ()
+    reads: Callable[[str], tuple[str, ...]] | None = None
 
 
 @runtime_checkable

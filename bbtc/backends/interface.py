@@ -12,7 +12,7 @@ from bbtc.backends.names import Symbol, parameter_names
 from bbtc.backends.shape import normal
 from bbtc.ground.condition import TRUE, Condition, variables
 from bbtc.ground.task import GroundAction, Task, Variable
-from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, walk
+from bbtc.tree.nodes import ActionNode, ConditionNode, Tree, actions_of, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,19 +77,24 @@ def during_of(task: Task, node: ActionNode) -> Condition | None:
     return None if during == TRUE else during
 
 
-def interface_of(tree: Tree) -> Interface:
-    """The interface of a tree: what its conditions, guards and actions refer to, and what its monitor asks
-    for."""
-    task, root = tree.task, tree.root
+def variables_read(tree: Tree) -> dict[int, None]:
+    """The variables that conditions, guards and what actions go on while read, in the order of the tree."""
+    task = tree.task
     read: dict[int, None] = {}
-    actions: dict[Symbol, None] = {}
-    for node in walk(root):
+    for node in walk(tree.root):
         if isinstance(node, ConditionNode):
             read.update(dict.fromkeys(variables(normal(task, node.condition))))
         elif isinstance(node, ActionNode):
-            actions[action_symbol(task.action_by_name[node.action])] = None
             for asked_too in (guard_of(task, node), during_of(task, node)):
                 read.update(dict.fromkeys(variables(asked_too or TRUE)))
+    return read
+
+
+def interface_of(tree: Tree) -> Interface:
+    """The interface of a tree: what its conditions, guards and actions refer to, and what its monitor asks
+    for."""
+    task, read = tree.task, variables_read(tree)
+    actions = {action_symbol(task.action_by_name[node.action]) for node in actions_of(tree.root)}
     told = frozenset[int]() if tree.monitor is None else tree.monitor.known
     asked = [index for index in read if index not in told]
     asked += [] if tree.monitor is None else sorted(tree.monitor.seen.difference(asked))

@@ -121,6 +121,12 @@ def module_name(text: str) -> str:
     return f"tree_{base}" if base in PYTHON_RESERVED | _TAKEN_MODULES else base
 
 
+def interface_header(interface: str) -> str:
+    """The file name that ROS 2 derives from the name of an interface: ``LightOn`` is ``light_on``."""
+    spaced = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", interface)
+    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", spaced).lower()
+
+
 def snake(text: str) -> str:
     """A snake_case identifier for any text, not injective."""
     return _base(text, "snake")

@@ -7,9 +7,10 @@ by an entry point of the group ``bbtc.exporters`` that loads an object of the pr
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -138,6 +139,25 @@ def parse_options(exporter: Exporter, texts: Mapping[str, str]) -> dict[str, Opt
         else option.default
         for option in exporter.options
     }
+
+
+def files_read(exporter: Exporter, texts: Mapping[str, str], folder: str | Path = "") -> list[str]:
+    """The files that options of a format name, relative to a folder, and those that are read for them."""
+    given = [(option, texts.get(option.name)) for option in exporter.options]
+    return [
+        path
+        for option, text in given
+        if option.reads and text
+        for path in option.reads(str(Path(folder, text)))
+    ]
+
+
+def with_paths(
+    form: str, texts: Iterable[tuple[str, str]], place: Callable[[str], str]
+) -> tuple[tuple[str, str], ...]:
+    """Options of a format in which every name of a file is replaced by where it is."""
+    files = {option.name for option in load_exporter(form).options if option.reads}
+    return tuple((name, place(text) if name in files and text else text) for name, text in texts)
 
 
 def _parse_value(format_name: str, option: Option, text: str) -> OptionValue:

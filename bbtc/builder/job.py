@@ -14,13 +14,13 @@ from bbtc.backends.exporter import Begun, Files
 from bbtc.diagnostics import BbtcError, Diagnostic, Report
 from bbtc.exit_status import OF_TREE, ExitStatus
 from bbtc.files.read_write import system_trouble
+from bbtc.files.sources import decode_source
 from bbtc.limits import PLANNING_SECONDS, Limits
 from bbtc.manifest.entries import Export, TreeEntry
 from bbtc.manifest.measured import Measured
 from bbtc.planner.options import Options
 from bbtc.planner.result import Plan
 from bbtc.source import SourceFile
-from bbtc.syntax.reader import decode_source
 from bbtc.tree.deep import stack_room
 from bbtc.tree.nodes import Tree, walk
 from bbtc.watch import Watch, watching

@@ -9,6 +9,7 @@ import contextlib
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -211,6 +212,7 @@ class _Builder:
     def _job(self, entry: TreeEntry, stale: set[str]) -> Job:
         """What has to be done for a tree. Raises :class:`BbtcError` for an input that cannot be read, and for
         a place that cannot be written to."""
+        from bbtc.backends.registry import with_paths
         from bbtc.builder.job import FIGURES, TREE, Job, export_step
 
         if self.held is not None:
@@ -220,7 +222,11 @@ class _Builder:
             with contextlib.suppress(OSError):
                 tree = self.contents.read(entry.file)
         every = tree is None  # a new tree makes everything anew
-        exports = tuple(e for e in entry.exports if every or export_step(e.name) in stale)
+        exports = tuple(
+            replace(each, options=with_paths(each.form, each.options, partial(source_name, self.folder)))
+            for each in entry.exports
+            if every or export_step(each.name) in stale
+        )
         figures = bool(entry.expect) and (every or FIGURES in stale)
         read = every or (figures and any(expectation.disturbed for expectation in entry.expect))
         sources = _sources(self.contents, entry) if read else ()
@@ -230,7 +236,7 @@ class _Builder:
 
     def _settle(self, entry: TreeEntry, made: Made) -> Outcome:
         """Write what was made, take note of it, and tell what became of the tree."""
-        from bbtc.builder.job import TREE
+        from bbtc.builder.job import TREE, export_step
 
         diagnostics = [*made.diagnostics, *complaints(entry, made)]
         if made.failure is not None:
@@ -243,8 +249,9 @@ class _Builder:
         except BbtcError as error:
             return Outcome(entry.name, "failed", (), (*diagnostics, *error.diagnostics), "error")
         done = self.fresh[entry.name]
+        reads = {export_step(export.name): export.reads for export in entry.exports}
         for name, files in made.steps.items():
-            inputs = entry.inputs if name == TREE else (entry.file,)
+            inputs = entry.inputs if name == TREE else (entry.file, *reads.get(name, ()))
             known = {path: self.contents.digest(path) or "" for path in inputs}
             outputs = {
                 path: (path in made.begun and self.contents.digest(path)) or self.contents.wrote(path, data)
@@ -320,7 +327,7 @@ def _require_apart(manifest: Manifest) -> None:
     """Raise :class:`BbtcError` where something that is to be made is, by another name, the manifest or an
     input of a tree. (What has the same name is told when the manifest is read.)"""
     sources = SameFiles()
-    for path in (manifest.file.name, *(path for entry in manifest.trees for path in entry.inputs)):
+    for path in (manifest.file.name, *(path for entry in manifest.trees for path in entry.reads)):
         sources.note(str(manifest.folder / path), path)
     found = []
     for entry in manifest.trees:
@@ -349,7 +356,7 @@ def sources_of(manifest: Path) -> list[Path]:
     files = {file}
     with contextlib.suppress(BbtcError):
         for entry in read_manifest(file, manifest_bytes(file)).trees:
-            files.update(file.parent / path for path in entry.inputs)
+            files.update(file.parent / path for path in entry.reads)
     return sorted(files)
 
 

@@ -242,8 +242,6 @@ def sole_builder(folder: Path) -> Iterator[Held]:
             scratch = stack.enter_context(own.sub("scratch", make=True))
             at = f"{FOLDER}/{_STATE}"
             own.require_place((_STATE,))
-            at = f"{FOLDER}/.gitignore"
-            _ignore_itself(own, scratch)
             at = f"{FOLDER}/{_LOCK}"
             lock = own.open(_LOCK, os.O_RDWR | os.O_CREAT)
         except OSError as error:
@@ -259,6 +257,10 @@ def sole_builder(folder: Path) -> Iterator[Held]:
         for left in leftovers(scratch):
             with contextlib.suppress(OSError):
                 scratch.remove(left)
+        try:
+            _ignore_itself(own, scratch)  # not before: another build would clear away what is written aside
+        except OSError as error:
+            raise cannot_build(source_name(folder, f"{FOLDER}/.gitignore"), error) from error
         yield Held(folder, project, own, scratch)
 
 

@@ -73,7 +73,7 @@ class Session:
 
     def read(self, path: str) -> SourceFile:
         """A source file, ``-`` for stdin; remembered for ``--depfile``."""
-        from bbtc.syntax.reader import read_source
+        from bbtc.files.sources import read_source
 
         self.inputs.append(path)
         return read_source(path, self.limits.file_bytes)

@@ -15,13 +15,16 @@ from bbtc.source import AS_WRITTEN, Reading, Span
 @dataclass(frozen=True, slots=True)
 class Export:
     """An artefact to make of a tree. ``file`` is relative to the project's folder; it is a folder
-    where the format is several files (``many``). ``options`` are those given, by name."""
+    where the format is several files (``many``). ``options`` are those given, by name; ``reads``
+    are the files that they name, and what is read for these: relative to the project's folder, if they
+    are in it."""
 
     name: str
     form: str
     file: str
     options: tuple[tuple[str, str], ...] = ()
     many: bool = False
+    reads: tuple[str, ...] = ()
     span: Span | None = field(default=None, compare=False)
 
 
@@ -51,6 +54,11 @@ class TreeEntry:
     span: Span | None = field(default=None, compare=False)
     input_spans: tuple[Span | None, ...] = field(default=(), compare=False)
     """Where the manifest names the inputs."""
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Its inputs, and the files that its exports read beside the tree."""
+        return (*self.inputs, *(path for export in self.exports for path in export.reads))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TypeVar, cast
 
 from bbtc.artefacts.cursor import At, Faults, Stop, clip, run_reader
+from bbtc.artefacts.marked import Marked, Written, read_toml, read_yaml
 from bbtc.artefacts.numbers import parse_probability
 from bbtc.backends.exporter import Exporter
-from bbtc.backends.registry import load_exporter, parse_options
+from bbtc.backends.registry import files_read, load_exporter, parse_options
 from bbtc.diagnostics import BbtcError, Unreadable
+from bbtc.files.sources import decode_source
 from bbtc.manifest import modules
 from bbtc.manifest.entries import Export, Manifest, TreeEntry
 from bbtc.manifest.expectations import Expectation, parse_expectation, success_in_time
-from bbtc.manifest.marked import Marked, Written, read_toml, read_yaml
 from bbtc.manifest.places import Places
 from bbtc.planner.options import Prefer, Retries
 from bbtc.planner.strategies import DEFAULT, STRATEGIES
 from bbtc.printable import printable
 from bbtc.source import Reading
-from bbtc.syntax.reader import decode_source
 
 _T = TypeVar("_T")
 
@@ -221,7 +221,17 @@ class _Reader:
             file = f"{self.output}/{own or f'{tree}{part}' + (exporter.suffix or f'-{form}')}"
         self.places.claim(at, file, f"{tree}, {name}", folder=not exporter.suffix)
         span = self.marked.span(at.path)
-        return Export(name, form, file, options, not exporter.suffix, span)
+        reads = tuple(self._reads(exporter, dict(options)))
+        for path in reads:
+            self.places.read(path)
+        return Export(name, form, file, options, not exporter.suffix, reads, span)
+
+    def _reads(self, exporter: Exporter, texts: dict[str, str]) -> Iterator[str]:
+        """The files that options of an export name, and what is read for these."""
+        folder = self.places.file.parent
+        for path in files_read(exporter, texts, folder):
+            inside = Path(path)
+            yield str(inside.relative_to(folder)) if inside.is_relative_to(folder) else path
 
     @staticmethod
     def _options(at: At, exporter: Exporter) -> tuple[tuple[str, str], ...]:

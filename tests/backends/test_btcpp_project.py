@@ -340,8 +340,13 @@ def node(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def published(node: Path, *beliefs: str) -> list[str]:
     """What the node says; ``beliefs`` are published before one tick after the other."""
-    done = subprocess.run([node, *beliefs], capture_output=True, text=True, timeout=60, check=False)
-    return done.stdout.splitlines()
+    return ended(node, "--ros-args", *beliefs)[1]
+
+
+def ended(node: Path, *arguments: str) -> tuple[int, list[str]]:
+    """How the node ends, and what it says."""
+    done = subprocess.run([node, *arguments], capture_output=True, text=True, timeout=60, check=False)
+    return done.returncode, [*done.stdout.splitlines(), *done.stderr.splitlines()]
 
 
 def test_a_node_is_not_ticked_before_every_condition_has_been_told(node: Path) -> None:
@@ -363,6 +368,45 @@ def test_a_node_is_not_ticked_before_every_condition_has_been_told(node: Path) -
         assert said[-1] == "info: the tree returned RUNNING", light  # interrupted, neither blocked nor begun
         assert not any(line.startswith("ask") for line in said), light
     assert published(node, "", "LuminousityOk=0", "")[1:3] == ["publish LuminousityOk=0", "ask light_on"]
+
+
+def test_a_node_that_is_not_told_in_time_names_what_it_waited_for_and_ends(node: Path) -> None:
+    lost = "the topic beliefs to tell of LuminousityOk(), Seen(soda)"
+    assert ended(node, "--startup-timeout", "0.1", "--ros-args", "for ever") == (
+        3,
+        [
+            f"warning: waiting for {lost}",
+            f"error: not told in time: waited for {lost}; the tree has not begun",
+        ],
+    )
+    lit = "publish LuminousityOk=1;Seen|soda=2"
+    status, said = ended(node, "--startup-timeout", "0.1", "--ros-args", lit.split()[1], "for ever")
+    assert (status, said[0]) == (3, lit)
+    assert said[-1].endswith(
+        "waited for the topic beliefs to tell of LuminousityOk(); the tree has not begun"
+    )
+
+
+def test_once_told_a_node_runs_however_long_it_takes(node: Path) -> None:
+    told = ["LuminousityOk=2", "", "LuminousityOk=2;Seen|soda=2", ""]  # 20 ms between two
+    status, said = ended(node, "--startup-timeout", "0.001", "--ros-args", *told)
+    assert (status, said[-1]) == (0, "info: the tree returned SUCCESS")
+
+
+def test_a_node_waits_however_long_where_it_is_told_so_and_a_minute_else(node: Path) -> None:
+    for options in ([], ["--startup-timeout", "none"], ["--startup-timeout", "5"]):
+        status, said = ended(node, *options, "--ros-args", *[""] * 10)
+        assert (status, said[-1]) == (1, "info: the tree returned RUNNING")  # interrupted
+    assert "kStartupTimeout = 60;" in (node.parents[1] / "main.cpp").read_text()
+
+
+def test_wrong_arguments_of_a_node_are_refused(node: Path) -> None:
+    for wrong in (
+        ["--startup"],
+        ["--startup-timeout"],
+        *(["--startup-timeout", x] for x in ("", "-1", "5s", "nan")),
+    ):
+        assert ended(node, *wrong) == (2, ["usage: main [--startup-timeout SECONDS|none]"])
 
 
 def test_an_unknown_can_is_looked_for_and_a_lost_light_starts_nothing(node: Path) -> None:

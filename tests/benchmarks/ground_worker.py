@@ -17,10 +17,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError, Report
+from bbtc.files.sources import read_source
 from bbtc.ground.instantiate import ground, instantiate
 from bbtc.limits import Limits
 from bbtc.pipeline import parse_all, resolve_model, select
-from bbtc.syntax.reader import read_source
 
 
 def _processor_seconds() -> float:

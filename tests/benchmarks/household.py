@@ -22,10 +22,10 @@ from pathlib import Path
 from statistics import median
 
 from bbtc.diagnostics import Report
+from bbtc.files.sources import read_source
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources
 from bbtc.planner.chaining.refine import refine
-from bbtc.syntax.reader import read_source
 
 REPOSITORY = Path(__file__).parents[2]
 FILES = [REPOSITORY / "domains" / "household" / name for name in ("domain.pddl", "look-for-soda.pddl")]

@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError, Report
+from bbtc.files.sources import read_source
 from bbtc.syntax.parser import parse
-from bbtc.syntax.reader import read_source
 from tests import downward
 from tests.benchmarks.grounding import pairs_of
 from tests.conftest import corpus_folder

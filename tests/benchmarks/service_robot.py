@@ -16,11 +16,11 @@ from pathlib import Path
 from types import ModuleType
 
 from bbtc.diagnostics import Report
+from bbtc.files.sources import read_source
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
 from bbtc.rewrite.simplify import size
 from bbtc.source import SourceFile
-from bbtc.syntax.reader import read_source
 
 FOLDER = Path(__file__).parents[2] / "domains" / "service-robot"
 RUNS = 5

@@ -37,11 +37,11 @@ def since(before: tuple[float, float]) -> list[float]:
 def ours(domain: Path, problem: Path) -> dict[str, Any]:
     """Explore and solve, from the ground task."""
     from bbtc.diagnostics import Report
+    from bbtc.files.sources import read_source
     from bbtc.limits import Limits
     from bbtc.pipeline import compile_sources
     from bbtc.planner.mdp.explore import explore_space
     from bbtc.planner.mdp.maxprob import max_prob
-    from bbtc.syntax.reader import read_source
 
     task = compile_sources([read_source(str(domain)), read_source(str(problem))], Report(), Limits())
     limits = Limits(states=10_000_000)
@@ -75,9 +75,9 @@ def storms(program: Path, *, sound: bool) -> dict[str, Any]:
 def write_program(domain: Path, problem: Path, path: Path) -> None:
     """The task as text for Storm."""
     from bbtc.diagnostics import Report
+    from bbtc.files.sources import read_source
     from bbtc.limits import Limits
     from bbtc.pipeline import compile_sources
-    from bbtc.syntax.reader import read_source
     from bbtc.verifier.naming import numbered
     from bbtc.verifier.prism import prism_text
     from bbtc.verifier.process import process_of

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias
 
 from bbtc.diagnostics import Report
+from bbtc.files.sources import read_source
 from bbtc.kleene import Truth
 from bbtc.syntax import ast
 from bbtc.syntax.parser import parse
-from bbtc.syntax.reader import read_source
 from tests.domains.problems import PROBLEMS, REPOSITORY, Problem, task_of
 
 Path: TypeAlias = tuple[Any, ...]

@@ -16,11 +16,11 @@ from click.testing import CliRunner
 from bbtc.api import load_tree
 from bbtc.cli.group import cli
 from bbtc.diagnostics import Report
+from bbtc.files.sources import read_source
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task, without_hidden
 from bbtc.planner.result import Plan
-from bbtc.syntax.reader import read_source
 from bbtc.tree.nodes import Tree
 from tests.sharing import shared
 

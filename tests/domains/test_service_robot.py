@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from bbtc.diagnostics import Report
+from bbtc.files.sources import read_source
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources, plan_task
 from bbtc.rewrite.simplify import size
 from bbtc.source import SourceFile
-from bbtc.syntax.reader import read_source
 from tests.benchmarks.service_robot import FOLDER, generator
 from tests.domains.problems import Problem, task_of
 

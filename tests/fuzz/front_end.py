@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 
 from bbtc.diagnostics import BbtcError, LimitReached, Report
+from bbtc.files.sources import decode_source
 from bbtc.limits import Limits
 from bbtc.pipeline import ground_model, parse_all, resolve_model, select
 from bbtc.source import SourceFile
 from bbtc.syntax.ast import Document
 from bbtc.syntax.parser import parse
 from bbtc.syntax.printer import print_document
-from bbtc.syntax.reader import decode_source
 
 SECONDS = 10.0
 """Longest processor time that one small input may take."""

@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from bbtc.diagnostics import Report
+from bbtc.files.sources import read_source
 from bbtc.ground.instantiate import instantiate
 from bbtc.limits import Limits
 from bbtc.pipeline import parse_all, resolve_model, select
-from bbtc.syntax.reader import read_source
 from tests import downward
 from tests.conftest import corpus_folder
 from tests.corpus import read_corpus

@@ -14,10 +14,10 @@ import pytest
 
 from bbtc.artefacts import dumps, tree_to_json
 from bbtc.diagnostics import BbtcError, Report
+from bbtc.files.sources import decode_source
 from bbtc.limits import Limits
 from bbtc.pipeline import import_tree
 from bbtc.source import SourceFile
-from bbtc.syntax.reader import decode_source
 from bbtc.tree.nodes import Tree
 from tests.domains.problems import PROBLEMS, Problem, tree_of
 from tests.imports.samples import PROFILES, check_in_engine, elements, exported, idioms_tree, parsed, read
@@ -299,7 +299,7 @@ def test_a_default_of_the_palette_counts_for_a_subtree() -> None:
 
 
 def test_utf_16_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    from bbtc.syntax.reader import read_source
+    from bbtc.files.sources import read_source
 
     file = tmp_path / "tree.xml"
     file.write_bytes(exported(idioms_tree(), "stock").encode("utf-16"))

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from bbtc.diagnostics import Report
+from bbtc.files.sources import read_source
 from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.pipeline import compile_sources
-from bbtc.syntax.reader import read_source
 from tests.conftest import corpus_folder
 
 BUDGETS = (1, 2, 3, 4, 6, 8, 12)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from bbtc.diagnostics import Report
+from bbtc.files.sources import decode_source
 from bbtc.syntax.parser import parse
-from bbtc.syntax.reader import decode_source
 from bbtc.syntax.tables import grammar_text
 
 CASES = sorted((Path(__file__).parent / "errors").glob("*.pddl"))

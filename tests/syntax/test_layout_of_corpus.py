@@ -9,12 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from bbtc.diagnostics import BbtcError, Report
+from bbtc.files.sources import read_source
 from bbtc.source import SourceFile
 from bbtc.syntax import ast
 from bbtc.syntax.layout import WIDTH
 from bbtc.syntax.parser import parse
 from bbtc.syntax.printer import print_document
-from bbtc.syntax.reader import read_source
 from tests.long_form import amount
 
 EVERY = amount(40, 1)

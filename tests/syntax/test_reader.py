@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from bbtc.diagnostics import BbtcError, Diagnostic
-from bbtc.syntax.reader import read_source
+from bbtc.files.sources import read_source
 
 
 def _refused(path: str, max_bytes: int = 1000) -> Diagnostic:

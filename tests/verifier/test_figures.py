@@ -14,11 +14,11 @@ from hypothesis import given
 from bbtc.artefacts import load_tree
 from bbtc.belief.simulate import simulate
 from bbtc.diagnostics import LimitReached
+from bbtc.files.sources import read_source
 from bbtc.ground.condition import TRUE, And, Is, Known, Not
 from bbtc.kleene import Truth
 from bbtc.limits import Limits
 from bbtc.pipeline import verify_tree
-from bbtc.syntax.reader import read_source
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlKind, ControlNode, Node, Tree
 from bbtc.verifier.chain import Form, chain_of, solvable_chain
 from bbtc.verifier.explore import explore

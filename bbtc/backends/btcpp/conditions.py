@@ -19,11 +19,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 from xml.etree.ElementTree import Element
 
 from typing_extensions import assert_never
 
+from bbtc.backends.btcpp.bindings.bound import NEGATION
 from bbtc.backends.btcpp.holding import Holding, Ports, bounds_given
 from bbtc.backends.btcpp.idioms import Idioms, decorated
 from bbtc.backends.btcpp.names import BtcppNames, TreeIds, is_numeric, ports_for
@@ -175,7 +177,9 @@ class ConditionWriter:
             case Is(variable, Truth.TRUE):
                 return self._leaf(variable, ports)
             case Is(variable, Truth.FALSE):
-                return decorated("Inverter", self._leaf(variable, ports))
+                leaf = self._leaf(variable, ports)
+                # One that answers the contrary is inverted already.
+                return leaf[0] if leaf.tag == NEGATION else decorated(NEGATION, leaf)
             case Is(variable, _):
                 return self._test("unknown", variable, ports)
             case Known(variable):
@@ -183,7 +187,7 @@ class ConditionWriter:
             case Within():
                 return self._number(condition, ports)
             case Not(part):
-                return decorated("Inverter", self._kleene(part, ports))
+                return decorated(NEGATION, self._kleene(part, ports))
             case And(parts):
                 return self._junction("sequence", parts, ports)
             case Or(parts):
@@ -214,6 +218,9 @@ class ConditionWriter:
             return self._kept("Held", variable, ports)
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
+        bound = self._names.bound.element(symbol, read.args, partial(self.value, ports=ports))
+        if bound is not None:
+            return bound
         return self._with_ports(Element(self._names.ids[symbol]), symbol, read.args, ports)
 
     def _is_held(self, variable: int, ports: Ports) -> bool:
@@ -227,7 +234,8 @@ class ConditionWriter:
         symbol, live = variable_symbol(read), replace(ports, live=True)
         if isinstance(fact, Within):
             return write(self._number(fact, live), entry if kind == "Held" else entry[1:-1])
-        if self._idioms.profile == "bbtc" or any(is_numeric(arg) for arg in read.args):
+        outright = any(is_numeric(arg) for arg in read.args) or symbol in self._names.bound.leaves
+        if self._idioms.profile == "bbtc" or outright:
             leaf = self._leaf(fact, live)
             return write(leaf, entry if kind == "Held" else entry[1:-1])
         port = self._entry_port(symbol)
@@ -269,7 +277,7 @@ class ConditionWriter:
     def _test(self, kind: Literal["known", "unknown"], variable: int, ports: Ports) -> Element:
         read = self._task.variables[variable]
         symbol = variable_symbol(read)
-        if any(is_numeric(arg) for arg in read.args):
+        if any(is_numeric(arg) for arg in read.args) or symbol in self._names.bound.leaves:
             return self._idioms.test(kind, self._leaf(variable, ports))
         held = self._is_held(variable, ports)
         entry = self._entry_port(symbol) if held and self._idioms.profile == "stock" else None

@@ -9,10 +9,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from xml.etree.ElementTree import Comment, Element, SubElement, tostring
 
 from typing_extensions import assert_never
 
+from bbtc.backends.btcpp.bindings.bound import BINDINGS, bindings_of
+from bbtc.backends.btcpp.bindings.entries import Bindings
 from bbtc.backends.btcpp.conditions import ConditionWriter
 from bbtc.backends.btcpp.holding import Holding, Ports
 from bbtc.backends.btcpp.idioms import SKIPPER_LABEL, Idioms, Profile, forgotten, full_again
@@ -20,7 +23,7 @@ from bbtc.backends.btcpp.names import Labels, TreeIds, btcpp_names, is_numeric, 
 from bbtc.backends.btcpp.notes import CLAIM, DIGITS, TEMPLATE, condition_below, notes, template_label
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, entry_prefix, namespace_of, profile_of, xml_text
 from bbtc.backends.btcpp.palette import node_model
-from bbtc.backends.commitment import Fact, facts_read
+from bbtc.backends.commitment import Fact, facts_read, first_variable
 from bbtc.backends.exporter import Figures, Option, OptionValue
 from bbtc.backends.interface import action_symbol, during_of, guard_of, variable_symbol
 from bbtc.backends.shape import fit, written
@@ -52,16 +55,17 @@ class BtcppExporter:
     options: tuple[Option, ...] = (
         NODES,
         NAMESPACE,
+        BINDINGS,
         Option("model", True, "append the TreeNodesModel, which editors such as Groot2 read"),
         Option("notes", True, "append the comment from which `bbtc import` reads the very same tree"),
     )
 
     def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
-        """The XML. Raises :class:`BbtcError` for a tree that is too deep (BBT0705) and for a namespace
-        that is none (BBT0704)."""
+        """The XML. Raises :class:`BbtcError` for a tree that is too deep (BBT0705), for a namespace
+        that is none (BBT0704), and for bindings that have faults or do not fit the tree."""
         del figures  # a file that runs has no place for them
         namespace = namespace_of(self.name, options)
-        writer = _Writer(tree, profile_of(options), namespace)
+        writer = _Writer(tree, profile_of(options), namespace, bindings_of(options))
         document = writer.document(bool(options.get("model", True)), bool(options.get("notes", True)))
         return xml_text(document)
 
@@ -101,10 +105,10 @@ class _Hoisted:
 class _Writer:
     """Writes one document: BehaviorTrees are collected while the main tree is written."""
 
-    def __init__(self, tree: Tree, profile: Profile, namespace: str) -> None:
+    def __init__(self, tree: Tree, profile: Profile, namespace: str, bindings: Bindings) -> None:
         self.tree = tree
         self.task: Task = tree.task
-        self.names = btcpp_names(tree, namespace)
+        self.names = btcpp_names(tree, namespace, bindings)
         self.profile: Profile = profile
         self.tree_ids = TreeIds(self.names, self.task.problem)
         prefix = entry_prefix(namespace)
@@ -118,6 +122,9 @@ class _Writer:
         self.attempts: Iterator[int] = itertools.count(1)
         self.root = fit(tree.root, ENGINE)
         self.holding = Holding(replace(tree, root=self.root), self.names, self.idioms.own)
+        if profile == "bbtc":
+            held = (variable_symbol(self.task.variables[first_variable(fact)]) for fact in self.holding.facts)
+            self.names.bound.refuse_held(held)
         self.conditions = ConditionWriter(self.task, self.names, self.tree_ids, self.idioms, self.holding)
 
     def document(self, model: bool, with_notes: bool) -> Element:
@@ -305,13 +312,17 @@ class _Writer:
         that is latched for an attempt keeps how it ended."""
         # A number passed to a SubTree changes its type from 4.9 on: it stays a literal inside.
         passed = {port: arg for port, arg in self._ports(action) if not is_numeric(arg)}
-        tag = Element(self.names.ids[action_symbol(action)])
-        for port, arg in self._ports(action):
-            tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
+        args = {arg: port for port, arg in reversed(passed.items())}
+        symbol, value = action_symbol(action), partial(self.conditions.value, ports=Ports(args))
+        tag = self.names.bound.element(symbol, action.args, value)
+        if tag is None:
+            tag = Element(self.names.ids[symbol])
+            for port, arg in self._ports(action):
+                tag.set(port, f"{{{port}}}" if port in passed else self.names.values[arg])
         tag = self._limited(tag, action)
         held = self.holding.by_action.get(node.action, ())
         used = [*held, *facts_read(self.task, guard or TRUE)]
-        ports = self.holding.ports(used, {arg: port for port, arg in reversed(passed.items())})
+        ports = self.holding.ports(used, args)
         needed = self._start_conditions(guard, ports, counters, held)
         title = self.names.plain[action_symbol(action)]
         often = "Again" if not node.latched else "Once" if entry is None else "OnceAnAttempt"
@@ -343,9 +354,12 @@ class _Writer:
         return self.idioms.start_conditions(read, counters, self.conditions.notes(held, ports))
 
     def _leaf(self, action: GroundAction, ports: Ports) -> Element:
-        element = Element(self.names.ids[action_symbol(action)])
-        for port, arg in self._ports(action):
-            element.set(port, self.conditions.value(arg, ports))
+        value = partial(self.conditions.value, ports=ports)
+        element = self.names.bound.element(action_symbol(action), action.args, value)
+        if element is None:
+            element = Element(self.names.ids[action_symbol(action)])
+            for port, arg in self._ports(action):
+                element.set(port, value(arg))
         return element
 
     def _limited(self, leaf: Element, action: GroundAction) -> Element:

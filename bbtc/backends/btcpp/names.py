@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from bbtc.backends.btcpp.bindings.bound import BoundNodes, bound_nodes
+from bbtc.backends.btcpp.bindings.entries import Bindings
 from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, WHILE
-from bbtc.backends.interface import Interface, interface_of
+from bbtc.backends.interface import Interface, Leaf, interface_of
 from bbtc.backends.names import Namer, Symbol, camel, identifiers, port_values
 from bbtc.ground.task import Task
 from bbtc.printable import printable
@@ -32,24 +34,32 @@ _NUMBERED = re.compile(r"(?: #[0-9]+)+$")
 
 @dataclass(frozen=True, slots=True)
 class BtcppNames:
-    """Ids of leaves, with the namespace in front and without it (``plain``), and object names as
-    values of ports."""
+    """Ids of leaves, with the namespace in front and without it (``plain``), object names as values of ports,
+    and the leaves that are nodes of others, whose ids are not for us (``taken``)."""
 
     interface: Interface
     namespace: str
     ids: Mapping[Symbol, str]
     plain: Mapping[Symbol, str]
     values: Mapping[str, str]
+    bound: BoundNodes = field(default_factory=BoundNodes)
+    taken: frozenset[str] = frozenset()
+
+    def ours(self, leaf: Leaf) -> bool:
+        """Is it a leaf of ours, and no node of others?"""
+        return leaf.symbol not in self.bound.leaves
 
 
-def btcpp_names(tree: Tree, namespace: str = "") -> BtcppNames:
+def btcpp_names(tree: Tree, namespace: str = "", bindings: Bindings | None = None) -> BtcppNames:
     """The names used in the export of a tree. ``namespace`` is any text; its CamelCase form comes
-    before every id."""
+    before every id. Raises :class:`BbtcError` for bindings that do not fit the tree."""
     interface = interface_of(tree)
     prefix = camel(namespace) if namespace else ""
-    plain = identifiers(interface.leaves, "camel", _reserved(prefix))
+    taken = frozenset[str]() if bindings is None else bindings.reserved
+    plain = identifiers(interface.leaves, "camel", _reserved(prefix, taken))
     ids = {symbol: f"{prefix}{name}" for symbol, name in plain.items()}
-    return BtcppNames(interface, prefix, ids, plain, port_values(objects_of(tree.task)))
+    bound = BoundNodes() if bindings is None else bound_nodes(tree, interface, bindings)
+    return BtcppNames(interface, prefix, ids, plain, port_values(objects_of(tree.task)), bound, taken)
 
 
 def objects_of(task: Task) -> list[str]:
@@ -59,10 +69,10 @@ def objects_of(task: Task) -> list[str]:
     return arguments
 
 
-def _reserved(prefix: str) -> set[str]:
+def _reserved(prefix: str, taken: frozenset[str]) -> set[str]:
     """What may not follow the prefix, because the whole would be a reserved id."""
     folded = prefix.casefold()
-    return {word[len(prefix) :] for word in RESERVED if word.casefold().startswith(folded)}
+    return {word[len(prefix) :] for word in RESERVED | taken if word.casefold().startswith(folded)}
 
 
 class TreeIds:
@@ -72,7 +82,7 @@ class TreeIds:
 
     def __init__(self, names: BtcppNames, problem: str) -> None:
         self._prefix = names.namespace
-        self._namer = Namer({*_reserved(self._prefix), *names.plain.values()})
+        self._namer = Namer({*_reserved(self._prefix, names.taken), *names.plain.values()})
         self._main = self._namer.take(camel(problem), seed=problem)
         self.main = f"{self._prefix}{self._main}"
 

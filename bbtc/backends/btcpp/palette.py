@@ -9,6 +9,7 @@ from typing import TypeAlias
 from xml.etree.ElementTree import Element, SubElement
 
 from bbtc.backends.btcpp import cppcode
+from bbtc.backends.btcpp.bindings.bound import BINDINGS, bindings_of
 from bbtc.backends.btcpp.idioms import COMMITTED, HELD, LATCH, SKIPPER, WHILE, Profile
 from bbtc.backends.btcpp.names import BtcppNames, btcpp_names
 from bbtc.backends.btcpp.options import NAMESPACE, NODES, namespace_of, profile_of, xml_text
@@ -30,10 +31,11 @@ def node_model(
     BehaviorTrees that have ports."""
     model = Element("TreeNodesModel")
     objects = _objects(task)
-    for condition in names.interface.conditions:
+    for condition in filter(names.ours, names.interface.conditions):
         _entry(model, "Condition", condition, names, objects)
-    for action in names.interface.actions:
+    for action in filter(names.ours, names.interface.actions):
         _entry(model, "Action", action, names, objects)
+    names.bound.describe(model)
     if profile == "bbtc":
         _our_nodes(model)
     for tree_id in sorted(subtrees):
@@ -164,13 +166,14 @@ class PaletteExporter:
     name: str = "btcpp_palette"
     description: str = "palette of the nodes of --to btcpp, for Groot2 and other editors"
     suffix: str = ".xml"
-    options: tuple[Option, ...] = (NODES, NAMESPACE)
+    options: tuple[Option, ...] = (NODES, NAMESPACE, BINDINGS)
 
     def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> str:
-        """The XML. Raises :class:`BbtcError` (BBT0704) for a namespace that is none."""
+        """The XML. Raises :class:`BbtcError` (BBT0704) for a namespace that is none, and for bindings that
+        have faults or do not fit the tree."""
         del figures
         document = Element("root", BTCPP_format="4")
-        names = btcpp_names(tree, namespace_of(self.name, options))
+        names = btcpp_names(tree, namespace_of(self.name, options), bindings_of(options))
         document.append(node_model(tree.task, names, profile_of(options), {}))
         return xml_text(document)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from importlib import resources
 
 from bbtc.backends.btcpp import cppcode
+from bbtc.backends.btcpp.bindings.bound import BINDINGS, bindings_of
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.leaves import LeafWriter, Program
 from bbtc.backends.btcpp.monitor import monitor_files
@@ -22,6 +23,7 @@ from bbtc.backends.btcpp.ros import ros_files
 from bbtc.backends.btcpp.world import SimulatedRobotWriter
 from bbtc.backends.exporter import Figures, Files, Option, OptionValue
 from bbtc.backends.names import snake
+from bbtc.diagnostics import BbtcError
 from bbtc.tree.nodes import Tree
 
 _LEAVES = Option(
@@ -39,17 +41,20 @@ class BtcppProjectExporter:
     name: str = "btcpp_project"
     description: str = "folder with a C++ program for the tree of --to btcpp, also in ROS 2"
     suffix: str = ""
-    options: tuple[Option, ...] = (NODES, NAMESPACE, _LEAVES)
+    options: tuple[Option, ...] = (NODES, NAMESPACE, _LEAVES, BINDINGS)
 
     def export(self, tree: Tree, options: Mapping[str, OptionValue], figures: Figures | None) -> Files:
-        """The files. Raises :class:`BbtcError` for a tree that is too deep (BBT0705) and for a namespace
-        that is none (BBT0704)."""
+        """The files. Raises :class:`BbtcError` for a tree that is too deep (BBT0705), for a namespace
+        that is none (BBT0704), and for bindings that have faults, or that the program has no part for."""
         namespace = namespace_of(self.name, options)
         names = btcpp_names(tree, namespace)
-        xml = btcpp.export(tree, {"nodes": options.get("nodes", "stock"), "namespace": namespace}, None)
+        # Its leaves are classes of the program, also those that are bound.
+        own = {"nodes": options.get("nodes", "stock"), "namespace": namespace}
+        xml = btcpp.export(tree, own, None)
+        bindings = bindings_of(options)
         # The first attribute of that name; ids hold no quotes.
         main_tree = xml.partition('main_tree_to_execute="')[2].partition('"')[0]
-        files = {"tree.xml": xml, "palette.xml": btcpp_palette.export(tree, options, figures)}
+        files = {"tree.xml": xml, "palette.xml": btcpp_palette.export(tree, own, figures)}
         program = Program(
             package=f"{snake(tree.task.problem)}_tree",
             space=f"{snake(namespace) if namespace else 'robot'}_tree",
@@ -60,7 +65,11 @@ class BtcppProjectExporter:
             files |= {name: _static(name) for name in ("bbtc_nodes.hpp", "bbtc_nodes_plugin.cpp")}
         match options.get("leaves"):
             case "ros2-actions" | "ros2-services" as leaves:
-                files |= ros_files(tree, names, program, services=leaves == "ros2-services")
+                files |= ros_files(tree, names, program, leaves == "ros2-services", bindings)
+            case _ if bindings.bindings:
+                message = f"{bindings.file}: the program in plain C++ has no actions and topics of ROS 2"
+                hint = "bindings are for -O leaves=ros2-actions and ros2-services, and for --to btcpp"
+                raise BbtcError.single("BBT0713", message, hint=hint)
             case _:
                 files |= _plain_files(tree, names, program)
         return Files(files)

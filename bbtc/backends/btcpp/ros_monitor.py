@@ -106,7 +106,11 @@ _FIRST_TOLD = """\
 def watched_head(head: str) -> str:
     """What leaves begin with, with a monitor."""
     head = head.replace(ACCESS, MONITOR_ACCESS).replace("OURS\n", '#include "monitor_table.hpp"\nOURS\n')
-    head = head.replace("\n private:\n  rclcpp::Logger", f"{_MONITOR_OF_BELIEFS}  rclcpp::Logger", 1)
+    head = head.replace(
+        "\n private:\n  std::shared_ptr<rclcpp::Node>",
+        f"{_MONITOR_OF_BELIEFS}  std::shared_ptr<rclcpp::Node>",
+        1,
+    )
     head = head.replace(
         "  /// Take what has arrived.\n  void update() { executor_.spin_some(); }\n", _FIRST_TOLD
     )
@@ -116,20 +120,23 @@ def watched_head(head: str) -> str:
         "  Monitor monitor_{monitorTable(), [this](const std::string& fact) { return see(fact); }};\n",
     )
     head = head.replace(
-        "  if (!missing.empty()) {\n",
+        "  if (missing.empty()) {\n",
         "  for (const auto& fact : beliefs.monitor().asks()) {\n"
         "    if (!beliefs.hasTold(fact)) {\n"
-        "      missing.insert(fact);\n"
+        '      missing["beliefs"].insert(fact);\n'
         "    }\n"
         "  }\n"
-        "  if (!missing.empty()) {\n",
+        "  if (beliefs.monitor().waits()) {\n"
+        '    missing["beliefs"].insert("what is told before the first action");\n'
+        "  }\n"
+        "  if (missing.empty()) {\n",
         1,
     )
     head = head.replace("#include <chrono>\n", "#include <algorithm>\n#include <chrono>\n", 1)
     head = head.replace("switch (beliefs_->value(fact()))", "switch (beliefs_->known(fact()))")
     return head.replace(
-        "  bool isTold() const {\n",
-        "  bool isTold() const {\n"
+        "  bool isTold() const override {\n",
+        "  bool isTold() const override {\n"
         "    if (beliefs_->monitor().knows(Beliefs::nameOf(fact().condition, fact().arguments))) {\n"
         "      return true;\n"
         "    }\n",

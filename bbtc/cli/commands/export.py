@@ -73,6 +73,7 @@ def command(
     depfile: str | None,
 ) -> int:
     """Write TREE in FORMAT. With a DOMAIN and PROBLEM in its place, plan on the way."""
+    from bbtc.backends.registry import files_read, load_exporter
     from bbtc.cli.commands.plan import best_tree_on_signals, run_planner
     from bbtc.cli.inputs import is_artefact, is_tree, task_of, tree_of
     from bbtc.pipeline import export_tree
@@ -82,6 +83,7 @@ def command(
     pairs = dict(_pair(option) for option in options)
     require_place(session, form, pairs, output, files, check=check, depfile=depfile)
     require_strategy(strategy, DEFAULTS)
+    session.inputs += files_read(load_exporter(form), pairs)
     sources = [session.read(file) for file in files]
     if len(sources) == 1 and is_artefact(sources[0]) and is_tree(sources[0]):
         tree = tree_of(sources[0])
@@ -120,10 +122,11 @@ def require_place(
 ) -> None:
     """Refuse, before any work, an unknown format or option, a place that cannot be written to or is
     that of an input, several files on stdout, and pixels on a terminal."""
-    from bbtc.backends.registry import load_exporter, parse_options
+    from bbtc.backends.registry import files_read, load_exporter, parse_options
 
     exporter = load_exporter(form)
     parse_options(exporter, options)
+    inputs = [*inputs, *files_read(exporter, options)]
     if output == "-" and not exporter.suffix:
         raise click.UsageError(f"The format '{form}' is several files: name a directory with -o.")
     if output == "-" and form == "png" and on_terminal(sys.stdout):

@@ -19,6 +19,7 @@ from bbtc.cli.session import command as session_command
 @click.option(
     "--tree", "main", default=None, metavar="ID", help="The BehaviorTree of FILE to read; see docs/import.md."
 )
+@click.option("--bindings", default="", metavar="YAML", help="The bindings that FILE was exported with.")
 @problem_options
 @limit_options
 @output_options
@@ -30,6 +31,7 @@ def command(
     form: str,
     namespace: str,
     main: str | None,
+    bindings: str,
     output: str,
     check: bool,
     depfile: str | None,
@@ -37,12 +39,17 @@ def command(
     """Read FILE, which `bbtc export` wrote as btcpp or json and a person may have edited, and write the
     tree with its figures computed anew. BehaviorTree.CPP files need the task that they are about: a
     DOMAIN and PROBLEM, a compiled TASK, or the TREE that was exported."""
+    from bbtc.backends.btcpp.bindings.read import files_of
     from bbtc.pipeline import export_tree, import_tree
 
-    require_place(session, form, {}, output, (file, *others), check=check, depfile=depfile)
+    read = files_of(bindings) if bindings else ()
+    require_place(session, form, {}, output, (file, *others, *read), check=check, depfile=depfile)
+    session.inputs += read
     sources = [session.read(path) for path in (file, *others)]
     first, *rest = sources
     report, limits, reading = session.report, session.limits, session.reading
-    tree = import_tree(first, rest, report, limits, namespace=namespace, main=main, reading=reading)
+    tree = import_tree(
+        first, rest, report, limits, namespace=namespace, main=main, reading=reading, bindings=bindings
+    )
     artefact = export_tree(tree, form, {}, session.limits)
     session.write(output, artefact, check=check, depfile=depfile)

@@ -1,5 +1,6 @@
-// Runs the generated node. Each argument tells what is published before a spin: "" for nothing, or the beliefs of a
-// message, such as "Seen|soda=1;IsLit=2" (a condition, its arguments, its value). After the last one it is interrupted.
+// Runs the generated node, with the arguments before --ros-args. Each one after that tells what is published before a
+// spin: "" for nothing, or the beliefs of a message, such as "Seen|soda=1;IsLit=2" (a condition, its arguments, its
+// value). After the last one it is interrupted, but "for ever" is never over.
 #include <csignal>
 #include <sstream>
 
@@ -30,7 +31,14 @@ Message parsed(const std::string& text) {
 
 int main(int count, char** arguments) {
   int next = 1;
+  while (next < count && std::string(arguments[next]) != "--ros-args") {
+    ++next;
+  }
+  ++next;
   rclcpp::onSpin() = [&] {
+    if (next < count && std::string(arguments[next]) == "for ever") {
+      return;
+    }
     if (next >= count) {
       std::raise(SIGTERM);
     } else if (const std::string text = arguments[next++]; !text.empty()) {

@@ -12,7 +12,7 @@ from bbtc.backends.btcpp.reader.leaves import Leaves
 from bbtc.backends.btcpp.reader.patterns import HELD_LEAF, KNOWN, NOTE, REGISTER, UNKNOWN
 from bbtc.backends.btcpp.reader.shapes import Match, has, match, match_one, tag_of
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.backends.commitment import Fact
 from bbtc.backends.shape import DEEPEST_CONDITION, can_be_unknown
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Or, negation

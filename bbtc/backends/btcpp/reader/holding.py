@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.reader.leaves import Leaves
 from bbtc.backends.btcpp.reader.unread import unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.backends.commitment import Fact, first_variable, held_by
 from bbtc.diagnostics import Diagnostic
 from bbtc.ground.condition import Condition, Is, Within

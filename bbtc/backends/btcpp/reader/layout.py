@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.reader.shapes import has
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.diagnostics import BbtcError, Diagnostic
 from bbtc.markov import reachable
 

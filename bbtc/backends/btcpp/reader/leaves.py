@@ -11,7 +11,7 @@ from bbtc.backends.btcpp.names import objects_of
 from bbtc.backends.btcpp.reader.layout import is_port
 from bbtc.backends.btcpp.reader.shapes import tag_of
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.backends.interface import BOUNDS, action_symbol, parameters_of, variable_symbol
 from bbtc.backends.names import Kind, Symbol, camel, port_values, possible_identifiers
 from bbtc.diagnostics import Unreadable

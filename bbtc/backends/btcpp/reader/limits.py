@@ -8,7 +8,7 @@ from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.idioms import TIMEOUT, milliseconds
 from bbtc.backends.btcpp.reader.shapes import Hole, Pattern, Shape
 from bbtc.backends.btcpp.reader.unread import unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.ground.task import GroundAction
 
 _TIME = Pattern(re.compile("(?P<msec>[0-9]{1,13})"), "30000")

@@ -15,7 +15,7 @@ from bbtc.artefacts.numbers import parse_number
 from bbtc.backends.btcpp.names import shown, without_number
 from bbtc.backends.btcpp.notes import KIND, MARK, VERSION, kind_of, template_label
 from bbtc.backends.btcpp.reader.leaves import FileNames
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument
+from bbtc.backends.btcpp.xmltext import XmlDocument
 from bbtc.backends.names import Kind, Symbol
 from bbtc.backends.shape import written
 from bbtc.diagnostics import Unreadable

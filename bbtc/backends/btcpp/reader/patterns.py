@@ -27,7 +27,7 @@ from bbtc.backends.btcpp.reader.shapes import (
     has,
     match,
 )
-from bbtc.backends.btcpp.reader.xmltext import XmlElement
+from bbtc.backends.btcpp.xmltext import XmlElement
 
 _COUNTER = r"@[A-Za-z_]\w*"
 _LEFT = re.compile(rf"{_COUNTER} > 0(?: && {_COUNTER} > 0)*")

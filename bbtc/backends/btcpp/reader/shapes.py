@@ -15,7 +15,7 @@ from typing import TypeAlias
 from typing_extensions import assert_never
 
 from bbtc.backends.btcpp.idioms import SKIPPER
-from bbtc.backends.btcpp.reader.xmltext import XmlElement
+from bbtc.backends.btcpp.xmltext import XmlElement
 
 _KINDS = ("Action", "Condition", "Control", "Decorator")
 _BOOLEANS = {word: value for value in (True, False) for word in (str(value), str(value).lower())}

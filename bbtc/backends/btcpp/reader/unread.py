@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from bbtc.artefacts.cursor import clip
 from bbtc.backends.btcpp.reader.shapes import Match, is_long, tag_of
-from bbtc.backends.btcpp.reader.xmltext import XmlDocument, XmlElement
+from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
 from bbtc.diagnostics import Diagnostic, Unreadable
 
 _SHOWN = MappingProxyType(

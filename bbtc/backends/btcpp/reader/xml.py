@@ -14,6 +14,7 @@ from fractions import Fraction
 from itertools import islice
 
 from bbtc.artefacts.cursor import clip
+from bbtc.backends.btcpp.bindings.entries import Bindings
 from bbtc.backends.btcpp.idioms import (
     HELD,
     LATCH,
@@ -44,8 +45,9 @@ from bbtc.backends.btcpp.reader.patterns import (
 )
 from bbtc.backends.btcpp.reader.scope import Scope
 from bbtc.backends.btcpp.reader.shapes import Match, boolean_of, has, is_skipper, match, match_one, tag_of
+from bbtc.backends.btcpp.reader.unbound import put_back
 from bbtc.backends.btcpp.reader.unread import Unread, unreadable
-from bbtc.backends.btcpp.reader.xmltext import XmlElement, parse_xml
+from bbtc.backends.btcpp.xmltext import XmlElement, parse_xml
 from bbtc.backends.interface import during_of, guard_of
 from bbtc.backends.shape import words_of, written
 from bbtc.diagnostics import BbtcError, Diagnostic, Report, Unreadable
@@ -90,10 +92,12 @@ def tree_from_btcpp(
     *,
     namespace: str = "",
     main: str | None = None,
+    bindings: Bindings | None = None,
 ) -> Imported:
     """The tree of a BehaviorTree.CPP file, on a task. Its success probability is what the file's notes
     claim, or 0 without a meaning where they claim nothing. ``namespace`` is that of the ids, where the notes
-    do not tell; ``main`` the id of the tree to read, where it is not the one that the file runs.
+    do not tell; ``main`` the id of the tree to read, where it is not the one that the file runs; ``bindings``
+    are those that it was exported with.
 
     Raises :class:`BbtcError` with everything that cannot be read, and :class:`LimitReached` for a tree of
     more nodes than the limits allow. Doubts go to the report.
@@ -109,6 +113,8 @@ def tree_from_btcpp(
         about = clip(f"{notes.domain}/{notes.problem}")
         message = f"the tree is for {about}, the task is {clip(f'{task.domain}/{task.problem}')}"
         raise BbtcError.single("BBT0604", message, document.span(document.root))
+    if bindings is not None:
+        put_back(document, task, notes.names, bindings)
     layout = Layout(document, main)
     reader = _Reader(layout, task, notes, limits)
     root = unwind(reader.main())

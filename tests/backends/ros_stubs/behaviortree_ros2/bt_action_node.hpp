@@ -19,14 +19,16 @@ class RosActionNode : public RosStubNode {
   virtual NodeStatus onFailure(ActionNodeErrorCode) { return NodeStatus::FAILURE; }
 
  private:
-  bool ask() override {
+  bool ask(std::string& shown) override {
     Goal goal;
-    return setGoal(goal);
+    const bool right = setGoal(goal);
+    shown = Shown<Goal>::of(goal);
+    return right;
   }
 
   NodeStatus answer() override {
     WrappedResult result{std::make_shared<typename ActionT::Result>()};
-    result.result->success = true;
+    succeed(*result.result, 0);
     return onResultReceived(result);
   }
 };

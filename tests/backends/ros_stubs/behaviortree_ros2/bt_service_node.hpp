@@ -17,14 +17,16 @@ class RosServiceNode : public RosStubNode {
   virtual NodeStatus onFailure(ServiceNodeErrorCode) { return NodeStatus::FAILURE; }
 
  private:
-  bool ask() override {
+  bool ask(std::string& shown) override {
     auto request = std::make_shared<Request>();
-    return setRequest(request);
+    const bool right = setRequest(request);
+    shown = Shown<Request>::of(*request);
+    return right;
   }
 
   NodeStatus answer() override {
     auto response = std::make_shared<Response>();
-    response->success = true;
+    succeed(*response, 0);
     return onResponseReceived(response);
   }
 };

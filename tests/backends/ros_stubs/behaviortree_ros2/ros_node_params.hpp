@@ -17,6 +17,20 @@ struct RosNodeParams {
   std::string default_port_value;
 };
 
+/// What is printed of a request: for tests, which tell for their types.
+template <class Request>
+struct Shown {
+  static std::string of(const Request&) { return ""; }
+};
+
+/// A result tells of success, if it can.
+template <class Result>
+auto succeed(Result& result, int) -> decltype(result.success = true, void()) {
+  result.success = true;
+}
+template <class Result>
+void succeed(Result&, long) {}
+
 /// The part that the nodes for actions and services share here: a request in the first tick, which is printed,
 /// and its answer in the next.
 class RosStubNode : public ActionNodeBase {
@@ -37,14 +51,15 @@ class RosStubNode : public ActionNodeBase {
       return answer();
     }
     setStatus(NodeStatus::RUNNING);
-    if (!ask()) {
+    std::string shown;
+    if (!ask(shown)) {
       return NodeStatus::FAILURE;
     }
-    std::printf("ask %s\n", server_.c_str());
+    std::printf("ask %s%s\n", server_.c_str(), shown.c_str());
     return NodeStatus::RUNNING;
   }
 
-  virtual bool ask() = 0;
+  virtual bool ask(std::string& shown) = 0;
   virtual NodeStatus answer() = 0;
 
   static PortsList withBasic(const char* basic, PortsList addition) {

@@ -11,6 +11,7 @@
 #define RCLCPP_STUB_LOG(level, logger, ...) \
   ((void)(logger), std::printf(level ": "), std::printf(__VA_ARGS__), std::printf("\n"))
 #define RCLCPP_INFO(logger, ...) RCLCPP_STUB_LOG("info", logger, __VA_ARGS__)
+#define RCLCPP_ERROR(logger, ...) RCLCPP_STUB_LOG("error", logger, __VA_ARGS__)
 #define RCLCPP_WARN(logger, ...) RCLCPP_STUB_LOG("warning", logger, __VA_ARGS__)
 
 namespace rclcpp {
@@ -32,6 +33,8 @@ struct CallbackGroup {
 
 struct QoS {
   explicit QoS(std::size_t) {}
+  QoS& best_effort() { return *this; }
+  QoS& transient_local() { return *this; }
 };
 
 struct SubscriptionOptions {
@@ -68,6 +71,9 @@ struct Node {
     auto made = std::make_shared<Subscription<Message>>();
     made->callback = std::forward<Callback>(callback);
     made->group = options.callback_group;
+    if (!subscriptions[topic].expired()) {
+      std::printf("a second subscription to %s\n", topic.c_str());
+    }
     subscriptions[topic] = made;
     return made;
   }
@@ -121,4 +127,13 @@ struct InitOptions {};
 enum class SignalHandlerOptions { All, SigInt, SigTerm, None };
 inline void init(int, char**, const InitOptions&, SignalHandlerOptions) {}
 inline void shutdown() {}
+
+/// What is left without the arguments of ROS, which begin with --ros-args.
+inline std::vector<std::string> remove_ros_arguments(int count, char const* const* given) {
+  std::vector<std::string> left;
+  for (int next = 0; next < count && std::string(given[next]) != "--ros-args"; ++next) {
+    left.emplace_back(given[next]);
+  }
+  return left;
+}
 }  // namespace rclcpp
