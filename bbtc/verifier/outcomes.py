@@ -122,6 +122,7 @@ class Outcomes:
         drawn = [factor for action in staged for factor in action.possible_factors]
         drawn += [factor for event in task.events for factor in event.factors]
         touched = {v for effect in effects_of(drawn) for v, _ in effect.sets}
+        touched |= {change.digits[0] for outcome in outcomes_of(drawn) for change in outcome.changes}
         for variable in sorted(touched & self.cell_of.keys()):
             of = self.draft.cells[self.cell_of[variable]]
             if of.kind == "number":

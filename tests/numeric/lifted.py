@@ -35,8 +35,12 @@ class World:
 
     ranges: dict[str, tuple[int, int, bool]] = field(default_factory=dict)
     actions: list[tuple[str, list[str], Any, Any]] = field(default_factory=list)
-    events: list[tuple[list[str], Any, Any]] = field(default_factory=list)
-    """What happens by itself, all of it at once."""
+    events: list[tuple[list[str], Any, Any, bool]] = field(default_factory=list)
+    """What happens by itself, all of it at once; is it drawn by the second?"""
+    times: dict[str, list[tuple[int, Fraction]]] = field(default_factory=dict)
+    """The seconds that an action takes, until it is given up."""
+    lost: dict[str, tuple[Fraction, Any]] = field(default_factory=dict)
+    """How probably an action is given up, and what it does then."""
     ends: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     """While what an action goes on, and what it does otherwise."""
     objects: list[str] = field(default_factory=list)
@@ -71,10 +75,12 @@ class World:
                         )
                         if ":while" in fields:
                             world.ends[section[1]] = (fields[":while"], fields.get(":on-abort", ["and"]))
+                        if ":duration" in fields:
+                            world.takes(section[1], fields)
                     case ":exogenous":
                         fields = dict(zip(section[2::2], section[3::2], strict=True))
                         parts = fields.get(":parameters", []), fields.get(":precondition", ["and"])
-                        world.events.append((*parts, fields[":effect"]))
+                        world.events.append((*parts, fields[":effect"], fields.get(":per") == "second"))
                     case ":objects":
                         world.objects = section[1:]
                     case ":goal":
@@ -91,6 +97,31 @@ class World:
                         continue
         world.start = frozenset(facts), tuple(sorted(numbers.items()))
         return world
+
+    def takes(self, action: str, fields: dict[str, Any]) -> None:
+        """Read how long an action takes."""
+        said = fields[":duration"]
+        listed = [["", said, "1"]] if isinstance(said, str) else [["", *each] for each in said[1:]]
+        times = [(int(seconds), Fraction(p)) for _, seconds, p in listed]
+        if ":timeout" in fields:
+            most = int(fields[":timeout"])
+            late = sum((p for seconds, p in times if seconds > most), Fraction(0))
+            self.lost[action] = late, fields.get(":on-timeout", ["and"])
+            times = [(min(seconds, most), p) for seconds, p in times]
+        self.times[action] = times
+
+    def done(self, action: str, effect: Any, env: Env, state: State) -> dict[State, Fraction]:
+        """What an action leads to that is not ended by its condition: it may be given up."""
+        late, instead = self.lost.get(action, (Fraction(0), None))
+        found: dict[State, Fraction] = {}
+        for p, does in ((1 - late, effect), (late, instead)):
+            for new, q in self.results(does, env, state).items() if p else ():
+                found[new] = found.get(new, Fraction(0)) + p * q
+        return found
+
+    def meanwhile(self, action: str, chance: Fraction) -> Fraction:
+        """How probably something takes place that has a chance every second."""
+        return sum((p * (1 - (1 - chance) ** seconds) for seconds, p in self.times[action]), Fraction(0))
 
     def value(self, expression: Any, env: Env, state: State) -> Fraction:
         """The value of a numeric expression."""
@@ -206,18 +237,23 @@ class World:
                     continue
                 if self.leaves_range(effect, env, state):
                     continue
+                if name in self.lost and self.leaves_range(self.lost[name][1], env, state):
+                    continue
                 goes_on, abort = self.ends.get(name, (["and"], ["and"]))
                 if not self.holds(goes_on, env, state):
                     continue
                 found: dict[State, Fraction] = {}
                 if name in self.ends:
-                    for meanwhile, p in self.happened(state).items():
-                        does = effect if self.holds(goes_on, env, meanwhile) else abort
-                        for new, q in self.results(does, env, meanwhile).items():
+                    for meanwhile, p in self.happened(state, name).items():
+                        if self.holds(goes_on, env, meanwhile):
+                            ways = self.done(name, effect, env, meanwhile)
+                        else:
+                            ways = self.results(abort, env, meanwhile)
+                        for new, q in ways.items():
                             found[new] = found.get(new, Fraction(0)) + p * q
                 else:
-                    for done, p in self.results(effect, env, state).items():
-                        for new, q in self.happened(done).items():
+                    for done, p in self.done(name, effect, env, state).items():
+                        for new, q in self.happened(done, name).items():
                             found[new] = found.get(new, Fraction(0)) + p * q
                 yield f"{name}({','.join(args)})", found
 
@@ -234,14 +270,17 @@ class World:
             found[new] = found.get(new, Fraction(0)) + p
         return found
 
-    def happened(self, state: State) -> dict[State, Fraction]:
-        """The states after one draw of the events."""
+    def happened(self, state: State, action: str) -> dict[State, Fraction]:
+        """The states after the draw of the events that goes with an action."""
         due = []
-        for parameters, precondition, effect in self.events:
+        for parameters, precondition, effect, by_second in self.events:
             for args in product(self.objects, repeat=len(parameters)):
                 env = dict(zip(parameters, args, strict=True))
                 if self.holds(precondition, env, state) and not self.leaves_range(effect, env, state):
-                    due.append(list(self.drawn(effect, env, state)))
+                    what = effect
+                    if by_second:
+                        what = ["probabilistic", self.meanwhile(action, Fraction(effect[1])), effect[2]]
+                    due.append(list(self.drawn(what, env, state)))
         found: dict[State, Fraction] = {}
         for chosen in product(*due):
             probability, changes = Fraction(1), []

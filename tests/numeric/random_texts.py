@@ -68,7 +68,7 @@ class Writer:
         one, other = self.draw.choice(("1/2", "1/3", "0.3")), self.draw.choice(("1/4", "0.5"))
         return f"(probabilistic {one} {self.effect(depth - 1)} {other} {self.effect(depth - 1)})"
 
-    def events(self) -> list[str]:
+    def events(self, *, time: bool = False) -> list[str]:
         """What happens by itself: each number, and each fact, is changed by one event at most."""
         made = []
         for number, target in enumerate(self.draw.sample([*_NUMBERS, *_FACTS], self.draw.randint(1, 3))):
@@ -78,13 +78,27 @@ class Writer:
                 effect = f"({self.draw.choice(('increase', 'decrease'))} {target} {self.draw.randint(1, 3)})"
             p = self.draw.choice(("0.5", "1/3", "1"))
             condition = self.condition(1)
+            rate = " :per second" if time and self.draw.random() < 0.7 else ""
             made.append(
-                f"(:exogenous e{number} :precondition {condition} :effect (probabilistic {p} {effect}))"
+                f"(:exogenous e{number} :precondition {condition}{rate} :effect (probabilistic {p} {effect}))"
             )
         return made
 
-    def domain(self, *, events: bool = False) -> str:
-        """A domain with its problem."""
+    def timed(self) -> str:
+        """How long an action takes, and when it is given up."""
+        duration = self.draw.choice(
+            ("1", "2", "(empirical (1 0.5) (4 0.5))", "(empirical (2 0.25) (5 0.75))")
+        )
+        timeout = ""
+        if "empirical" in duration and self.draw.random() < 0.6:
+            timeout = " :timeout 3"
+            if self.draw.random() < 0.5:
+                timeout += f" :on-timeout {self.effect(1)}"
+        return f" :duration {duration}{timeout}"
+
+    def domain(self, *, events: bool = False, time: bool = False) -> str:
+        """A domain with its problem; with ``time``, actions take some, and some events take place by the
+        second."""
         low, high = self.draw.randint(-2, 1), self.draw.randint(3, 9)
         most = self.draw.randint(2, 6)
         policies = [self.draw.choice(("", " :saturate", " :block", "")) for _ in range(2)]
@@ -97,6 +111,8 @@ class Writer:
                 held = self.draw.choice(_FACTS)
                 ends = f" :while {held} :on-abort {self.effect(1)}"
                 ready += f" {held}"
+            if time:
+                ends += self.timed()
             actions.append(
                 f"(:action a{number} :precondition (and {self.condition()}{ready}){ends}"
                 f" :effect (and {self.effect()} {self.effect()}{used}))"
@@ -111,7 +127,7 @@ class Writer:
             f"(define (domain d) (:predicates (p0) (p1) (q ?x) {' '.join(flags)})\n"
             f"  (:functions (n) - (int {low} {high}{policies[0]})\n"
             f"    (m ?x) - (int 0 {most}{policies[1]}) (c ?x))\n  "
-            + "\n  ".join([*actions, *(self.events() if events else ())])
+            + "\n  ".join([*actions, *(self.events(time=time) if events else ())])
             + f")\n(define (problem p) (:domain d) (:objects a b)\n  (:init {start} {values})\n"
             f"  (:goal {self.condition(1)}))\n"
         )

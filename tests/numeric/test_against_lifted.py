@@ -20,14 +20,15 @@ _MOST_STATES = 3_000
 _EXACT = 1e-9
 
 
-@pytest.mark.parametrize("events", [False, True], ids=["alone", "with-events"])
+@pytest.mark.parametrize("beside", ["", "events", "events-and-time"], ids=lambda beside: beside or "alone")
 @pytest.mark.parametrize("part", range(5))
-def test_random_tasks_have_the_figures_of_their_text(part: int, events: bool) -> None:
+def test_random_tasks_have_the_figures_of_their_text(part: int, beside: str) -> None:
     """P*, the success of the planned tree, its round trip through JSON, and what verify finds."""
+    events, time = "events" in beside, "time" in beside
     each = amount(12, 200)
     told = 0
     for seed in range(part * each, part * each + each):
-        text = Writer(seed).domain(events=events)
+        text = Writer(seed).domain(events=events, time=time)
         world = World.of(text)
         best = world.best(_MOST_STATES)
         if best is None:

@@ -27,12 +27,13 @@ def test_a_number_is_one_variable_of_the_models() -> None:
 
 
 @pytest.mark.skipif(not is_installed(), reason="Storm is not installed")
-@pytest.mark.parametrize("events", [False, True], ids=["alone", "with-events"])
-def test_storm_finds_the_same_figures(events: bool) -> None:
+@pytest.mark.parametrize("beside", ["", "events", "events-and-time"], ids=lambda beside: beside or "alone")
+def test_storm_finds_the_same_figures(beside: str) -> None:
+    events, time = "events" in beside, "time" in beside
     asked = 0
     for seed in range(amount(30, 600)):
         try:
-            plan = bbtc.plan(SourceFile("random.pddl", Writer(seed).domain(events=events)))
+            plan = bbtc.plan(SourceFile("random.pddl", Writer(seed).domain(events=events, time=time)))
         except bbtc.BbtcError:
             continue
         if not 0 < plan.figures.success < 1 and seed % 5:
