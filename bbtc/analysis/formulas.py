@@ -390,6 +390,9 @@ def amount(names: Names, node: ast.NumericExpression, scope: Scope) -> me.Amount
             return me.Constant(node.value)
         case ast.FluentRef(name, args, span):
             function = names.functions.get(name.key)
+            if function is None and not args and name.key in names.objects:
+                unsupported(names, ast.Unsupported("object fluent", name.text, span))
+                return None
             if function is None:
                 names.unknown("BBT0220", "function", name, names.functions)
                 return None
