@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from bbtc.backends.btcpp.idioms import TIMEOUT
+from bbtc.backends.btcpp.idioms import LATCH, SKIPPER, TIMEOUT
 from bbtc.backends.btcpp.reader.patterns import READ
 from bbtc.backends.btcpp.reader.unread import WITHOUT_MEANING
 from bbtc.tree.nodes import ControlNode, Node, Tree
