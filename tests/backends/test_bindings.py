@@ -327,7 +327,7 @@ def test_a_node_that_stands_for_nothing_or_for_several_is_told(tmp_path: Path) -
 def test_random_bound_trees_do_what_those_of_our_leaves_do(tmp_path: Path) -> None:
     pytest.importorskip("behaviortreepy")
     rng, runs = random.Random(5), 0
-    for _ in range(amount(15, 300)):
+    for _ in range(amount(8, 300)):
         seed = rng.randrange(10**6)
         tree = random_tree(seed)
         symbols = [leaf.symbol for leaf in btcpp_names(tree).interface.leaves.values()]
@@ -562,7 +562,7 @@ ODD = [
 
 def test_broken_texts_are_told_and_nothing_else_happens(tmp_path: Path) -> None:
     tree, rng, told = patrol(), random.Random(3), list[Diagnostic]()
-    for _ in range(amount(150, 20_000)):
+    for _ in range(amount(75, 20_000)):
         text = BINDINGS
         for _ in range(rng.randint(1, 3)):
             start = rng.randrange(len(text))

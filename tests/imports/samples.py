@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 from bbtc.backends.btcpp.exporter import btcpp
 from bbtc.backends.btcpp.reader.xml import Imported, tree_from_btcpp
 from bbtc.diagnostics import BbtcError, Diagnostic, Report
+from bbtc.durations import Fixed
 from bbtc.ground.condition import FALSE, TRUE, And, Condition, Is, Known, Not, Or
 from bbtc.ground.task import Effect, Factor, GroundAction, InitialState, Outcome, Task, Variable
 from bbtc.kleene import Truth
@@ -43,7 +44,12 @@ def idioms_task() -> Task:
         goal=Is(seen, Truth.TRUE),
         actions=(
             GroundAction(
-                "go", ("7",), Is(lit, Truth.TRUE), (chance((near, Truth.TRUE), (near, Truth.FALSE)),)
+                "go",
+                ("7",),
+                Is(lit, Truth.TRUE),
+                (chance((near, Truth.TRUE), (near, Truth.FALSE)),),
+                duration=Fixed(Fraction(2)),
+                timeout=Fraction(30),
             ),
             GroundAction(
                 "look",

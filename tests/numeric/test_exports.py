@@ -45,7 +45,7 @@ def test_exports_run_as_the_simulation_says(form: str, courier: bbtc.Tree) -> No
     if engine_missing(form) is not None:
         pytest.skip(f"{engine_missing(form)} is not installed")
     assert difference(courier, form, Limits(), amount(60, 500)) is None
-    for seed in range(amount(25, 1_000)):
+    for seed in range(amount(10, 1_000)):
         plan = _planned(Writer(seed).domain())
         if plan is not None:
             assert difference(plan.tree, form, Limits(), amount(10, 200)) is None, seed
@@ -76,7 +76,7 @@ def test_the_simulated_world_of_py_trees_has_the_figures(courier: bbtc.Tree) -> 
     from py_trees.common import Status
 
     rng = random.Random(7)
-    runs, wins = amount(600, 10_000), 0
+    runs, wins = amount(400, 10_000), 0
     for _ in range(runs):
         world = space["SimulatedWorld"](space["INITIAL"], space["ACTIONS"], rng, lambda _: None)  # type: ignore[operator]
         wins += space["run"](space["create_root"](world)) == Status.SUCCESS  # type: ignore[operator]

@@ -31,7 +31,7 @@ def test_a_number_is_one_variable_of_the_models() -> None:
 def test_storm_finds_the_same_figures(beside: str) -> None:
     events, time = "events" in beside, "time" in beside
     asked = 0
-    for seed in range(amount(30, 600)):
+    for seed in range(amount(15, 600)):
         try:
             plan = bbtc.plan(SourceFile("random.pddl", Writer(seed).domain(events=events, time=time)))
         except bbtc.BbtcError:

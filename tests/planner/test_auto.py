@@ -28,7 +28,7 @@ from bbtc.planner.strategies import DEFAULT
 from bbtc.rewrite.simplify import numbered
 from bbtc.source import SourceFile
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Tree, actions_of, retries_of, walk
-from tests.domains.problems import PROBLEMS, Problem, task_of, tree_of
+from tests.domains.problems import PROBLEMS, SHORTER, Problem, task_of, tree_of
 from tests.long_form import LONG
 from tests.planner.test_refine import action, task
 from tests.profiles import examples
@@ -103,7 +103,7 @@ SLOW = {
 
 
 @pytest.mark.parametrize(
-    "problem", [each for each in PROBLEMS if LONG or str(each) != "hospital/two-boxes"], ids=str
+    "problem", [each for each in SHORTER if LONG or str(each) != "hospital/two-boxes"], ids=str
 )
 def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
     """The tree in its golden file; in the long form, the one that small limits allow."""
@@ -130,7 +130,7 @@ def test_our_domains_are_solved_with_small_trees(problem: Problem) -> None:
 LARGE = {"hospital/one-box", "hospital/two-boxes", "service-robot/two-goals"}
 
 
-@pytest.mark.parametrize("problem", [each for each in PROBLEMS if LONG or str(each) not in LARGE], ids=str)
+@pytest.mark.parametrize("problem", [each for each in SHORTER if LONG or str(each) not in LARGE], ids=str)
 def test_the_refinements_told_are_those_of_the_tree_that_is_kept(problem: Problem) -> None:
     done, steps = told(problem)
     assert steps == done.refinements

@@ -27,7 +27,7 @@ from bbtc.planner.result import Plan
 from bbtc.planner.strategies import DEFAULT, STRATEGIES
 from bbtc.tree.nodes import ActionNode, ConditionNode, ControlNode, Node, Tree, actions_of, walk
 from bbtc.verifier.verdict import verify
-from tests.domains.problems import PROBLEMS, Problem, task_of, tree_of
+from tests.domains.problems import PROBLEMS, SHORTER, Problem, task_of, tree_of
 from tests.long_form import amount
 from tests.profiles import examples
 from tests.strategies import tasks
@@ -67,7 +67,7 @@ def any_values(task: Task, rng: Random, count: int) -> Iterator[list[int]]:
         yield [rng.choice([0, 1, 2] if each.three_valued else [0, 2]) for each in task.variables]
 
 
-@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+@pytest.mark.parametrize("problem", SHORTER, ids=str)
 def test_trees_of_our_domains_keep_to_their_conditions_in_any_state(problem: Problem) -> None:
     rng = Random(7)
     for strategy in {problem.strategy, DEFAULT}:

@@ -25,7 +25,7 @@ from bbtc.planner.guard import guarded
 from bbtc.planner.recovering import recovering_tree
 from bbtc.tree.nodes import ActionNode, ControlNode, Node
 from tests.disturbance.reference import Exact, best_next, reachable
-from tests.domains.problems import PROBLEMS, Problem, task_of
+from tests.domains.problems import PROBLEMS, SHORTER, Problem, task_of
 from tests.long_form import amount
 from tests.planner.journeys import journey, journeys
 from tests.planner.test_auto import told
@@ -71,7 +71,7 @@ def test_runs_are_the_cheapest_of_the_best(of: Task) -> None:
     assert done.cost == pytest.approx(value.cost, abs=1e-9)
 
 
-@pytest.mark.parametrize("problem", PROBLEMS, ids=str)
+@pytest.mark.parametrize("problem", SHORTER, ids=str)
 def test_trees_of_our_domains_recover(problem: Problem) -> None:
     of = task_of(problem)
     if of.endless_beliefs:

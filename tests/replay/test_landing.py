@@ -34,7 +34,7 @@ from tests.replay.test_actions import shown
 from tests.replay.test_equivalence import lively_trees
 from tests.replay.ticks import TickScript, trace
 
-MOST = amount(15, 500)
+MOST = amount(8, 500)
 """Runs of a problem, the most probable first."""
 
 WAYS = amount(3, 10_000)
@@ -90,7 +90,7 @@ def test_compiled_trees_do_so_in_both_profiles(problem: Problem, kind: type[Comp
 @pytest.mark.parametrize("name", NEWEST)
 def test_random_trees_do_so(name: EngineName) -> None:
     with engine(name) as (_, make):
-        for _, tree, _ in lively_trees(0)[: amount(16, 125)]:
+        for _, tree, _ in lively_trees(0)[: amount(8, 125)]:
             check(tree, make(tree, "imported"))  # type: ignore[arg-type]
 
 

@@ -219,7 +219,7 @@ def compared(tree: Tree, seed: int) -> None:
         )
 
 
-@pytest.mark.parametrize("seed", range(amount(8, 200)))
+@pytest.mark.parametrize("seed", range(amount(5, 200)))
 def test_the_curves_hold_what_runs_attain(seed: int) -> None:
     generator = random.Random(seed)
     for _ in range(50):

@@ -24,6 +24,8 @@ SKIPPER, LATCH, HELD, COMMITTED, WHILE = "Skipper", "Latch", "Held", "Committed"
 
 UNTIL_SUCCESS = "RetryUntilSuccessful"
 TIMEOUT = "Timeout"
+RESULT = "_result"
+"""The entry in which an action that may be given up tells how it ended by itself."""
 
 SKIPPER_LABEL = "skipper"
 """The name that a Parallel gets where the Skipper has none."""
@@ -190,11 +192,15 @@ class Idioms:
         latch = Element("Switch2", variable=f"{{{entry}}}", case_1="success", case_2="failure")
         SubElement(latch, "AlwaysSuccess")
         SubElement(latch, "AlwaysFailure")
-        for event, status in (("_onSuccess", "success"), ("_onFailure", "failure"), ("_onHalted", "success")):
-            action.set(event, f"{entry} := '{status}'; {self.running} := false")
+        own, more = "'success'", ""
+        if len(action):  # given up, it counts as run; where it failed by itself, it has failed
+            action[0][0].set("_onFailure", f"{RESULT} := 'failure'")
+            own, more = RESULT, f"; {RESULT} := 'success'"
+        for event, status in (("_onSuccess", own), ("_onFailure", "'failure'"), ("_onHalted", "'success'")):
+            action.set(event, f"{entry} := {status}; {self.running} := false")
         # With memory: once the action runs, its own effect may end its precondition.
         started = SubElement(latch, "Sequence", name=WHEN_READY_LABEL)
-        started.extend([*needed, self._running(action, "", during)])
+        started.extend([*needed, self._running(action, more, during)])
         return latch
 
     def unlatched(self, action: Element, needed: Sequence[Element], during: Element | None = None) -> Element:
@@ -240,7 +246,7 @@ class Idioms:
         return decorated("ForceSuccess", self.control("skipper", [leaf, unknown]))
 
     def given_up(self, leaf: Element, seconds: Fraction) -> Element:
-        """The action, which has ended when it is given up after so many seconds, as it has when it fails."""
+        """The action, which has ended when it is given up after so many seconds."""
         limit = decorated(TIMEOUT, leaf)
         limit.set("msec", str(milliseconds(seconds)))
         return decorated("ForceSuccess", limit)

@@ -184,6 +184,7 @@ class Latch : public BT::ControlNode {
       keep_ = getInput<bool>("keep").value();
       flag_ = "@" + getInput<std::string>("flag").value();
       hold();
+      listen();
       started_ = true;
     }
     if (commitment_ != nullptr) {
@@ -196,10 +197,25 @@ class Latch : public BT::ControlNode {
     const BT::NodeStatus status =
         goes_on ? children_nodes_.back()->executeTick() : BT::NodeStatus::SUCCESS;
     if (status == BT::NodeStatus::SUCCESS || status == BT::NodeStatus::FAILURE) {
-      ended(status);
+      ended(goes_on && failed_ ? BT::NodeStatus::FAILURE : status);
       resetChildren();
     }
     return BT::NodeStatus::RUNNING;
+  }
+
+  /// Notice where the action itself fails: what gives it up in time hides that.
+  void listen() {
+    failed_ = false;
+    BT::TreeNode* leaf = children_nodes_.back();
+    while (auto* around = dynamic_cast<BT::DecoratorNode*>(leaf)) {
+      leaf = around->child();
+    }
+    ending_ = leaf->subscribeToStatusChange(
+        [this](BT::TimePoint, const BT::TreeNode&, BT::NodeStatus, BT::NodeStatus now) {
+          if (now == BT::NodeStatus::FAILURE) {  // not where a clock of its own halts it
+            failed_ = true;
+          }
+        });
   }
 
   /// The text of a port as it stands in the file.
@@ -286,6 +302,8 @@ class Latch : public BT::ControlNode {
   }
 
   std::optional<BT::NodeStatus> kept_;
+  BT::TreeNode::StatusChangeSubscriber ending_;
+  bool failed_ = false;
   bool started_ = false;
   bool keep_ = true;
   std::string flag_;

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from bbtc.artefacts.cursor import clip
-from bbtc.backends.btcpp.idioms import TIMEOUT, milliseconds
+from bbtc.backends.btcpp.idioms import RESULT, TIMEOUT, milliseconds
 from bbtc.backends.btcpp.reader.shapes import Hole, Pattern, Shape
 from bbtc.backends.btcpp.reader.unread import unreadable
 from bbtc.backends.btcpp.xmltext import XmlDocument, XmlElement
@@ -13,8 +13,12 @@ from bbtc.ground.task import GroundAction
 
 _TIME = Pattern(re.compile("(?P<msec>[0-9]{1,13})"), "30000")
 
-GIVEN_UP = Shape("ForceSuccess", {}, (Shape(TIMEOUT, {"msec": _TIME}, (Hole("leaf"),)),))
-"""An action that is given up after some time, which counts as its end."""
+GIVEN_UP, GIVEN_UP_ONCE = (
+    Shape("ForceSuccess", {}, (Shape(TIMEOUT, {"msec": _TIME}, (Hole("leaf", told),)),))
+    for told in ({}, {"_onFailure": f"{RESULT} := 'failure'"})
+)
+"""An action that is given up after some time, which counts as its end; and one whose own end is kept by what
+stands around it."""
 
 
 def check_limit(document: XmlDocument, leaf: XmlElement, found: str | None, action: GroundAction) -> None:

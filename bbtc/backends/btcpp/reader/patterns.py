@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from bbtc.backends.btcpp.idioms import (
     COMMITTED,
     HELD,
     HOLD_LABEL,
     LATCH,
+    RESULT,
     SKIPPER,
     TIMEOUT,
     UNTIL_SUCCESS,
@@ -231,9 +233,12 @@ _GOES_ON = Shape(
 """Halts an action that runs where a condition is no longer true."""
 
 
-def _actions(*first: Shape, committed: bool) -> tuple[tuple[Shape, str | None], ...]:
-    """The forms of actions, with the entry that they keep their status in. Where the tree is ``committed`` to
-    actions, they tell when they run."""
+_Forms: TypeAlias = tuple[tuple[Shape, str | None], ...]
+"""Shapes of the same elements, with the entry that an action keeps its status in."""
+
+
+def _actions(*first: Shape, committed: bool) -> tuple[_Forms, ...]:
+    """The forms of actions. Where the tree is ``committed`` to actions, they tell when they run."""
 
     def tells(script: str, example: str, value: str) -> Pattern:
         if committed:
@@ -253,32 +258,32 @@ def _actions(*first: Shape, committed: bool) -> tuple[tuple[Shape, str | None], 
         re.compile(f"{begins.pattern.pattern}; _started := 'yes'"), f"{begins.example}; _started := 'yes'"
     )
     ended = ends(_ENTRY, "_latch", ("success", "failure", "success"))
-    latched = _running(begins, Hole("leaf", ended), *first)
+    timed = Pattern(
+        re.compile(f"{begins.pattern.pattern}; (?P<result>{RESULT}) := 'success'"),
+        f"{begins.example}; {RESULT} := 'success'",
+    )
+    told = {"_onSuccess": tells(f"{_ENTRY} := {RESULT}", f"_latch := {RESULT}", "false")}
+    once = [
+        _running(begins, Hole("leaf", ended), *first),
+        _running(timed, Hole("leaf", {**ended, **told}), *first),
+    ]
     again = _running(started, Hole("leaf", ends("_started", "_started", ("no", "no", "no"))), *first)
     ready: dict[str, Value] = {"variable": "{_started}", "case_1": "yes", "case_2": "never"}
-    return (
-        (Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, latched)), "_latch"),
-        (
-            Shape(
-                "Switch2", _SWITCH, (_SUCCESS, _FAILURE, Shape("Sequence", {}, (Holes("needed"), latched)))
-            ),
-            "_latch",
-        ),
-        (_running(begins, Hole("leaf")), None),
-        (
-            Shape(
-                "ReactiveSequence",
-                {},
-                (Shape("Switch2", ready, (_SUCCESS, _FAILURE, Hole("ready"))), *again.children),
-            ),
-            "_started",
-        ),
+    latched: list[_Forms] = [
+        tuple((Shape("Switch2", _SWITCH, (_SUCCESS, _FAILURE, last)), "_latch") for last in lasts)
+        for lasts in (once, [Shape("Sequence", {}, (Holes("needed"), shape)) for shape in once])
+    ]
+    repeated = Shape(
+        "ReactiveSequence",
+        {},
+        (Shape("Switch2", ready, (_SUCCESS, _FAILURE, Hole("ready"))), *again.children),
     )
+    return (*latched, ((_running(begins, Hole("leaf")), None),), ((repeated, "_started"),))
 
 
 _ACTIONS = (
-    *((form,) for form in _actions(_GOES_ON, committed=True)),
-    *zip(_actions(committed=True), _actions(committed=False), strict=True),
+    *_actions(_GOES_ON, committed=True),
+    *(one + other for one, other in zip(_actions(committed=True), _actions(committed=False), strict=True)),
 )
 
 KNOWN = Shape(SKIPPER, {}, (Shape("ForceSuccess", {}, (Hole("leaf"),)), _FAILURE))
@@ -348,7 +353,7 @@ READ = frozenset(
             KNOWN,
             UNKNOWN,
             REGISTER,
-            *(shape for shape, _ in _actions(committed=True)),
+            *(shape for forms in _actions(committed=True) for shape, _ in forms),
         )
     )
 )
@@ -386,7 +391,7 @@ def action_of(element: XmlElement) -> ActionParts | None:
         ways = [(found, keeps) for shape, keeps in forms if (found := match(shape, element)) is not None]
         if not ways:
             continue
-        found, keeps = min(ways, key=lambda way: bool(way[0].wrong))
+        found, keeps = min(ways, key=lambda way: (bool(way[0].wrong), "result" not in way[0].texts))
         needed: Sequence[XmlElement] = found.parts.get("needed", [])
         if "ready" in found.parts:
             needed = _needed(found.part("ready"), found)

@@ -31,7 +31,7 @@ from bbtc.backends.btcpp.reader.conditions import ConditionReader
 from bbtc.backends.btcpp.reader.holding import Holds
 from bbtc.backends.btcpp.reader.layout import Layout, is_port
 from bbtc.backends.btcpp.reader.leaves import Leaves
-from bbtc.backends.btcpp.reader.limits import GIVEN_UP, check_limit
+from bbtc.backends.btcpp.reader.limits import GIVEN_UP, GIVEN_UP_ONCE, check_limit
 from bbtc.backends.btcpp.reader.notes import Notes, read_notes, with_notes
 from bbtc.backends.btcpp.reader.patterns import (
     NOT_COMMITTED,
@@ -500,7 +500,11 @@ class _Reader:
         """The action node of an idiom. ``element`` carries its label; the idiom itself may stand in a
         BehaviorTree, with a scope ``inside`` it."""
         self._unread.take(parts.found)
-        limited = match(GIVEN_UP, parts.leaf)
+        once = parts.latched and parts.found.shape is not None
+        limited = match(GIVEN_UP_ONCE if once else GIVEN_UP, parts.leaf)
+        if once and (limited is not None) != ("result" in parts.found.texts):
+            said = "an action that may be given up keeps how it ended by itself, and only such a one does"
+            raise unreadable(self._document, parts.leaf, "BBT0616", said, hint="export the tree anew")
         if limited is not None:
             self._unread.take(limited)
         leaf = parts.leaf if limited is None else limited.part("leaf")
