@@ -25,7 +25,7 @@ _EXACT = 1e-9
 def test_random_tasks_have_the_figures_of_their_text(part: int, beside: str) -> None:
     """P*, the success of the planned tree, its round trip through JSON, and what verify finds."""
     events, time = "events" in beside, "time" in beside
-    each = amount(8, 200)
+    each = amount(12, 200)
     told = 0
     for seed in range(part * each, part * each + each):
         text = Writer(seed).domain(events=events, time=time)

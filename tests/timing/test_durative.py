@@ -139,7 +139,7 @@ def planned(text: str) -> Plan | str:
 def test_plans_are_as_long_as_those_of_an_interpreter_that_knows_moments(part: int) -> None:
     generator = random.Random(part)
     compared = found = 0
-    for _ in range(amount(35, 1500)):
+    for _ in range(amount(70, 1500)):
         text, steps = random_task(generator)
         plan = planned(text)
         if isinstance(plan, str):
