@@ -13,6 +13,7 @@ import bbtc
 from bbtc.limits import Limits
 from bbtc.pipeline import verify_tree
 from bbtc.replay.engines import BtcppReplay, PyTreesReplay
+from bbtc.source import SourceFile
 from bbtc.tree.nodes import ControlNode, Tree, walk
 from tests.replay.reference import expected_ticks
 from tests.replay.ticks import random_script, trace
@@ -29,6 +30,14 @@ def test_it_is_read_with_its_attempts() -> None:
     nodes = [node for node in walk(imported().root) if isinstance(node, ControlNode)]
     assert [node.attempts for node in nodes if node.kind == "retry-until-success"] == [3]
     assert imported().task.action_by_name["grasp()"].timeout == 4
+
+
+def test_of_another_mistake_only_that_is_told() -> None:
+    wrong = FILE.read_text(encoding="utf-8").replace("<Approach/>", "<Approach/><Approach/>")
+    with pytest.raises(bbtc.BbtcError) as told:
+        bbtc.import_tree(SourceFile("wrong.xml", wrong), TASK)
+    assert told.value.diagnostics
+    assert not any("Timeout" in each.message for each in told.value.diagnostics)
 
 
 def test_it_succeeds_as_often_as_three_attempts_do() -> None:
