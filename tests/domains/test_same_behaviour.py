@@ -27,7 +27,7 @@ from tests.sharing import shared
 MOST = 500
 """Scenarios of a problem, the most probable first."""
 
-BUDGET = amount(150, 1_000_000)
+BUDGET = amount(100, 1_000_000)
 """Steps of the scenarios of a problem that are replayed, with each timing, in each engine."""
 
 

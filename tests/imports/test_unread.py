@@ -205,7 +205,7 @@ def test_the_page_lists_what_is_without_meaning() -> None:
 
 # --- nodes -----------------------------------------------------------------------------------
 
-STEP = amount(48, 1)
+STEP = amount(72, 1)
 """Of the places in the sample every so many are tried with a node, others with another."""
 
 OF_ENGINE = {tag: ports for nodes in NODES.values() for tag, ports in nodes.items()}

@@ -34,7 +34,7 @@ from tests.replay.test_actions import shown
 from tests.replay.test_equivalence import lively_trees
 from tests.replay.ticks import TickScript, trace
 
-MOST = amount(8, 500)
+MOST = amount(6, 500)
 """Runs of a problem, the most probable first."""
 
 WAYS = amount(3, 10_000)

@@ -25,7 +25,7 @@ from tests.replay.reference import Running, expected_ticks, value_of
 from tests.replay.ticks import Tick, TickScript, TickWorld, random_script, trace
 from tests.sharing import shared
 
-TREES = amount(140, 2000)
+TREES = amount(100, 2000)
 SCRIPTS = 5
 TICKS = 20
 """Ticks of a script; most trees end sooner."""
