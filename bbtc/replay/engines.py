@@ -28,7 +28,11 @@ class Replay(ABC):
 
     def run(self, script: Script, timing: Timing = "between") -> Run:
         """Replay one script in a new tree."""
-        world = self.world = ScriptedWorld(self.task, script, timing)
+        return self.run_in(ScriptedWorld(self.task, script, timing))
+
+    def run_in(self, world: ScriptedWorld) -> Run:
+        """What a new tree does in a world."""
+        self.world = world
         self.begin(world)
         self._watch(world)
         try:

@@ -7,9 +7,7 @@ import random
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 
 from bbtc.ground.task import Task
-from bbtc.replay.engines import Replay
-from bbtc.replay.script import OffScript, Run, Script, ScriptedWorld
-from tests.replay.compiled import CompiledReplay
+from bbtc.replay.script import Script, ScriptedWorld
 from tests.replay.reference import set_by
 
 MOMENTS = 6
@@ -61,23 +59,6 @@ class LandingWorld(ScriptedWorld):
         if moment == LAST:
             assert self.values == self._pending
             self._pending = None
-
-
-def run_in(engine: Replay | CompiledReplay, world: LandingWorld) -> Run:
-    """What a new tree does in a world."""
-    if isinstance(engine, CompiledReplay):
-        return engine.run_in(world)
-    engine.begin(world)
-    try:
-        for _ in range(world.most_ticks()):
-            match engine.tick():
-                case "running":
-                    world.between_ticks()
-                case "success" | "failure" as ended:
-                    return Run(tuple(world.actions), ended, world.values)
-    except OffScript:
-        return Run(tuple(world.actions), "cut", world.values)
-    return Run(tuple(world.actions), "endless", world.values)
 
 
 def every_landing(task: Task, script: Script, most: int, rng: random.Random) -> Iterator[list[Landing]]:

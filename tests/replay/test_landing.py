@@ -29,7 +29,7 @@ from tests.long_form import LONG, amount
 from tests.replay.all_engines import Compared, EngineName, engine
 from tests.replay.compiled import CompiledReplay, CompiledStockReplay, require_library
 from tests.replay.covering import covering
-from tests.replay.landing import LAST, LandingWorld, every_landing, run_in
+from tests.replay.landing import LAST, LandingWorld, every_landing
 from tests.replay.test_actions import shown
 from tests.replay.test_equivalence import lively_trees
 from tests.replay.ticks import TickScript, trace
@@ -57,7 +57,7 @@ def check(tree: Tree, replay: Replay | CompiledReplay) -> tuple[int, int]:
         script, expected = script_of(scenario), run_of(scenario)
         for landings in every_landing(tree.task, script, WAYS, rng):
             world = LandingWorld(tree.task, script, landings)
-            assert run_in(replay, world) == expected, (landings, script)
+            assert replay.run_in(world) == expected, (landings, script)
             assert world.cancelled == []
             compared += 1
     return len(runs), compared
@@ -133,7 +133,7 @@ def test_a_robot_that_is_nowhere_while_it_drives_arrives(name: EngineName) -> No
     script = Script(START, (("drive()", THERE),))
     with engine(name) as (_, make):
         world = LandingWorld(drive.task, script, [{HALL: 0, LAB: LAST}])
-        assert run_in(make(drive, "imported"), world) == Run(("drive()",), "success", THERE)  # type: ignore[arg-type]
+        assert make(drive, "imported").run_in(world) == Run(("drive()",), "success", THERE)  # type: ignore[union-attr]
     found = ticks(name, drive, START, NOWHERE, NOWHERE, THERE, length=3)
     assert found == ["+drive() running", ".drive() running", ".drive() running", " success"]
 

@@ -14,6 +14,7 @@ import bbtc
 from bbtc import pipeline
 from bbtc.artefacts import load_tree, tree_to_json
 from bbtc.artefacts.jsontext import dumps
+from bbtc.ground.task import Task
 from bbtc.limits import Limits
 from bbtc.planner.deadline import plan as deadlines
 from bbtc.planner.deadline.induction import induction
@@ -50,13 +51,16 @@ WAYS = """
 
 
 def planned(text: str, seconds: int) -> deadlines.DeadlinePlan:
-    task = bbtc.compile(SourceFile("d.pddl", text))
+    return planned_for(bbtc.compile(SourceFile("d.pddl", text)), seconds, Limits(seconds=60))
+
+
+def planned_for(task: Task, seconds: int, limits: Limits) -> deadlines.DeadlinePlan:
     return deadlines.plan_by(
         task,
         F(seconds),
         pipeline.plan_task,
         None,
-        Limits(seconds=60),
+        limits,
         strategy="auto",
         progress=lambda _: None,
         options=Options(),
@@ -185,16 +189,7 @@ def test_a_task_without_durations_knows_no_deadline(tmp_path: Path) -> None:
 def test_a_deadline_pays_in_the_building(problem: str, seconds: int) -> None:
     task = bbtc.compile("domains/building/domain.pddl", f"domains/building/{problem}.pddl")
     base = deadlines.judged(bbtc.plan(task), F(seconds), Limits())
-    found = deadlines.plan_by(
-        task,
-        F(seconds),
-        pipeline.plan_task,
-        None,
-        Limits(seconds=120),
-        strategy="auto",
-        progress=lambda _: None,
-        options=Options(),
-    )
+    found = planned_for(task, seconds, Limits(seconds=120))
     assert base.tree.success_by is not None
     assert found.by.at_least > base.tree.success_by.at_most
 

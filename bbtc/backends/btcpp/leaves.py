@@ -160,20 +160,7 @@ class NAME : public BT::ConditionNode {
 };
 """
 
-_NUMBER = """\
-class NAME : public BT::ConditionNode {
- public:
-  NAME(const std::string& name, const BT::NodeConfig& config, Robot* robot)
-      : BT::ConditionNode(name, config), robot_(robot) {}
-
-  static BT::PortsList providedPorts() { return PORTS; }
-
- private:
-  BT::NodeStatus tick() override { return between(*this, robot_->METHOD(ARGUMENTS)); }
-
-  Robot* robot_;
-};
-"""
+_NUMBER = _CONDITION.replace("statusOf(", "between(*this, ")
 
 _BETWEEN = """\
 /// The value of a port that holds a whole number.

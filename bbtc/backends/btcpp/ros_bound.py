@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from bbtc.artefacts.cursor import clip
-from bbtc.backends.btcpp import cppcode
+from bbtc.backends.btcpp import cppcode, ros_text
 from bbtc.backends.btcpp.bindings.bound import BoundLeaf, bound_leaves
 from bbtc.backends.btcpp.bindings.entries import (
     Argument,
@@ -331,45 +331,6 @@ ANSWER
 };
 """
 
-_ACTION = """\
-/// TOLD
-class NAME : public BT::RosActionNode<TYPE> {
- public:
-  using BT::RosActionNode<TYPE>::RosActionNode;
-
-  static BT::PortsList providedPorts() { return providedBasicPorts(PORTS); }
-
-  bool setGoal(Goal& request) override {
-FIELDS
-    return true;
-  }
-
-  BT::NodeStatus onResultReceived(const WrappedResult& result) override {
-ANSWER
-  }
-
-  BT::NodeStatus onFailure(BT::ActionNodeErrorCode /*error*/) override { return BT::NodeStatus::FAILURE; }
-};
-"""
-
-_SERVICE = """\
-/// TOLD
-class NAME : public BT::RosServiceNode<TYPE> {
- public:
-  using BT::RosServiceNode<TYPE>::RosServiceNode;
-
-  static BT::PortsList providedPorts() { return providedBasicPorts(PORTS); }
-
-  bool setRequest(Request::SharedPtr& given) override {
-    auto& request = *given;
-FIELDS
-    return true;
-  }
-
-  BT::NodeStatus onResponseReceived(const Response::SharedPtr& response) override {
-ANSWER
-  }
-
-  BT::NodeStatus onFailure(BT::ServiceNodeErrorCode /*error*/) override { return BT::NodeStatus::FAILURE; }
-};
-"""
+_ENDS = "    return {}->success ? BT::NodeStatus::SUCCESS : BT::NodeStatus::FAILURE;"
+_ACTION = ros_text.ACTION.replace(_ENDS.format("result.result"), "ANSWER")
+_SERVICE = ros_text.SERVICE.replace(_ENDS.format("response"), "ANSWER")
