@@ -47,43 +47,35 @@ _Found = dict[tuple[Values, Fraction, Fraction], Fraction]
 """Values, cost and reward so far, with their probability."""
 
 
-@dataclass(frozen=True)
-class _World:
-    """What actions and events do, each asked once for values before it."""
+def _through_events(task: Task, action: GroundAction, values: Values) -> _Found:
+    """What the rounds of events make of some values, one after the other."""
+    found: _Found = {(values, Fraction(0), Fraction(0)): Fraction(1)}
+    for events in task.rounds(action):
+        found = _after_round(events, found)
+    return found
 
-    task: Task
-    _asked: dict[tuple[str, Values], _Found] = field(default_factory=dict)
 
-    def _through_events(self, action: GroundAction, values: Values) -> _Found:
-        """What the rounds of events make of some values, one after the other."""
-        key = (action.name, values)
-        if key not in self._asked:
-            found: _Found = {(values, Fraction(0), Fraction(0)): Fraction(1)}
-            for events in self.task.rounds(action):
-                found = _after_round(events, found)
-            self._asked[key] = found
-        return self._asked[key]
+def _outcomes(
+    task: Task, action: GroundAction, values: Values
+) -> Iterator[tuple[Fraction, Values, Sets, Fraction, Fraction]]:
+    """What an action may do: its probability, the values it is done with, what it sets then, cost and reward.
+    An action with a condition to go on is done with what events left, or given up."""
+    before: _Found = {(values, Fraction(0), Fraction(0)): Fraction(1)}
+    if action.during is not None:
+        before = _through_events(task, action, values)
+    for (now, cost, reward), probability in before.items():
+        goes_on = action.during is None or value_of(action.during, now) == "T"
+        for chance, sets, more_cost, more_reward in every(
+            action.factors if goes_on else action.on_abort, now
+        ):
+            yield probability * chance, now, sets, cost + more_cost, reward + more_reward
 
-    def outcomes(
-        self, action: GroundAction, values: Values
-    ) -> Iterator[tuple[Fraction, Values, Sets, Fraction, Fraction]]:
-        """What an action may do: its probability, the values it is done with, what it sets then, cost and
-        reward. An action with a condition to go on is done with what events left, or given up."""
-        before: _Found = {(values, Fraction(0), Fraction(0)): Fraction(1)}
-        if action.during is not None:
-            before = self._through_events(action, values)
-        for (now, cost, reward), probability in before.items():
-            goes_on = action.during is None or value_of(action.during, now) == "T"
-            for chance, sets, more_cost, more_reward in every(
-                action.factors if goes_on else action.on_abort, now
-            ):
-                yield probability * chance, now, sets, cost + more_cost, reward + more_reward
 
-    def afterwards(self, action: GroundAction, values: Values) -> _Found:
-        """What events make of what an action left."""
-        if action.during is not None or not self.task.events:
-            return {(values, Fraction(0), Fraction(0)): Fraction(1)}
-        return self._through_events(action, values)
+def _afterwards(task: Task, action: GroundAction, values: Values) -> _Found:
+    """What events make of what an action left."""
+    if action.during is not None:
+        return {(values, Fraction(0), Fraction(0)): Fraction(1)}
+    return _through_events(task, action, values)
 
 
 def _after_round(events: Sequence[GroundEvent], before: _Found) -> _Found:
@@ -118,7 +110,7 @@ class _Step:
 def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> Totals:
     """Step by step through every run of a tree, until what still runs is improbable; in floating point where
     events take place by the second."""
-    totals, world = Totals(), _World(task)
+    totals = Totals()
     runs: dict[_Run, Fraction] = {}
     for state in task.initial:
         given = tuple(int(value) for value in state.values)
@@ -138,7 +130,7 @@ def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> 
         for run, probability in runs.items():
             step = steps.get(run)
             if step is None:
-                step = steps[run] = _step(world, root, run, number)
+                step = steps[run] = _step(task, root, run, number)
             if isinstance(step, str):
                 totals.ends[step] += probability
                 continue
@@ -151,9 +143,9 @@ def brute_force(task: Task, root: Node, cut: Fraction = Fraction(1, 10**12)) -> 
     return totals
 
 
-def _step(world: _World, root: Node, before: _Run, number: Callable[[Fraction], Fraction]) -> _Step | str:
+def _step(task: Task, root: Node, before: _Run, number: Callable[[Fraction], Fraction]) -> _Step | str:
     """What a run does next, or how it ends."""
-    task, (values, finished, tries, lost, beliefs) = world.task, before
+    values, finished, tries, lost, beliefs = before
     run = Ticking(task, values, set(finished), dict(tries), lost=dict(lost))
     status = run.tick_all(root)
     node = run.started
@@ -165,11 +157,11 @@ def _step(world: _World, root: Node, before: _Run, number: Callable[[Fraction], 
     tried, failed = (tuple(sorted(each.items())) for each in (run.tries, run.lost))
     following: dict[_Run, Fraction] = {}
     total_cost, total_reward = action.cost, Fraction(0)
-    for chance, now, sets, cost, reward in world.outcomes(action, values):
+    for chance, now, sets, cost, reward in _outcomes(task, action, values):
         for shown in after_changes(task, action.changes, now, beliefs):
             share = chance * shown.chance
             done = with_knowledge(task, changed(now, sets + shown.sets), shown.beliefs)
-            for (after, more_cost, more_reward), by_itself in world.afterwards(action, done).items():
+            for (after, more_cost, more_reward), by_itself in _afterwards(task, action, done).items():
                 total_cost += share * by_itself * (cost + shown.cost + more_cost)
                 total_reward += share * by_itself * (reward + shown.reward + more_reward)
                 key = (after, latches, tried, failed, shown.beliefs)
